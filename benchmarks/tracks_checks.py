@@ -13,7 +13,7 @@ import bisect
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -65,14 +65,12 @@ def swaps(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
     rows = []
     for kind in kinds.split(","):
         rng = np.random.default_rng(_SEED)
-        cases = [
-            _Case(maze, door_slots(maze), sample_pair(maze, int(rng.choice(DISTANCES)), rng))
-            for maze in check_mazes(kind, episodes)
-        ]
-        blocked = functools.cache(functools.partial(_blocked_share, cases))
-        doors = np.mean([len(case.slots) for case in cases])
-        num_open = np.mean([np.sum(~case.maze.walls[tuple(case.slots.T)]) for case in cases])
-        numbers = range(min(num_swappable(case.maze) for case in cases) + 2)  # the last one is too many
+        mazes = check_mazes(kind, episodes)
+        ends = [sample_pair(maze, int(rng.choice(DISTANCES)), rng) for maze in mazes]
+        blocked = functools.cache(functools.partial(_blocked_share, mazes, ends))
+        doors = np.mean([len(door_slots(maze)) for maze in mazes])
+        num_open = np.mean([np.sum(~maze.walls[tuple(door_slots(maze).T)]) for maze in mazes])
+        numbers = range(min(map(num_swappable, mazes)) + 2)  # the last one is too many
         found = [_nearest(blocked, bisect.bisect_left(numbers, share, key=blocked), share) for share in shares]
         most = bisect.bisect_left(numbers, math.inf, key=blocked) - 1
         cells = [f"{count}: {blocked(count):.2f}" if count <= most else "-" for count in (*found, most)]
@@ -80,30 +78,21 @@ def swaps(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
     print(format_table(["kind", "doors", "open", *(f"{share:g}" for share in shares), "at most"], rows))
 
 
-class _Case(NamedTuple):
-    """An episode of which the doors are moved."""
-
-    maze: Maze
-    slots: np.ndarray  # [D, 2] int
-    ends: tuple[Cell, Cell]
-
-
 def _nearest(blocked: Callable[[int], float], first_above: int, share: float) -> int:
     below = first_above - 1
     return below if share - blocked(below) < blocked(first_above) - share < math.inf else first_above
 
 
-def _blocked_share(cases: list[_Case], num_swaps: int) -> float:
+def _blocked_share(mazes: Sequence[Maze], ends: Sequence[tuple[Cell, Cell]], num_swaps: int) -> float:
     """Returns the share of paths that so many swaps block; infinite if a maze has no map with as many."""
-    try:
-        shown = [
-            # The first swaps of a case do not depend on their number.
-            swap_doors(case.maze.walls, case.maze.kind, num_swaps, case.ends, np.random.default_rng([_SEED, index]))
-            for index, case in enumerate(cases)
-        ]
-    except InputError:
-        return math.inf
-    blocked = [is_blocked(case.maze.walls, walls, case.ends) for case, walls in zip(cases, shown, strict=True)]
+    blocked = []
+    for index, (maze, pair) in enumerate(zip(mazes, ends, strict=True)):
+        # The first swaps in a maze do not depend on their number.
+        try:
+            shown = swap_doors(maze.walls, maze.kind, num_swaps, pair, np.random.default_rng([_SEED, index]))
+        except InputError:
+            return math.inf
+        blocked.append(is_blocked(maze.walls, shown, pair))
     return float(np.mean(blocked))
 
 
@@ -129,12 +118,9 @@ def worth(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
         )
         oracle = np.array([steps or np.inf for steps in measure_oracle_steps(shown, trials)])
         with_map, without = (_on_time(task, trials, oracle) for task in (shown, hidden))
-        success, map_worth = (
-            mean_interval(1.0 * np.isfinite(oracle), played),
-            difference_interval(with_map - without, played),
-        )
+        success = format_interval(mean_interval(1.0 * np.isfinite(oracle), played))
         means = [f"{values.mean():.2f}" for values in (oracle / cells, with_map, without)]
-        rows.append([kind, format_interval(success), *means, format_interval(map_worth)])
+        rows.append([kind, success, *means, format_interval(difference_interval(with_map - without, played))])
     head = ["kind", "oracle: success", "steps a cell", "navigator on time", "without map", "map worth"]
     print(format_table(head, rows))
 

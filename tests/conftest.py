@@ -69,6 +69,18 @@ def remarks() -> Iterator[Callable[[], list[str]]]:
 
 
 @pytest.fixture(scope="session")
+def planner_run(tmp_path_factory) -> pathlib.Path:
+    """The folder of an evaluation of a few episodes, which no test changes."""
+    from run_folders import FEW
+
+    from mazebench.evaluation.evaluate import evaluate
+
+    folder = tmp_path_factory.mktemp("runs") / "planner"
+    evaluate("planner", out=folder, **FEW)
+    return folder
+
+
+@pytest.fixture(scope="session")
 def made(tmp_path_factory) -> pathlib.Path:
     """The folder of the results that `make_results` makes."""
     from made_results import make_results

@@ -34,13 +34,6 @@ def random_run(tmp_path_factory) -> pathlib.Path:
 
 
 @pytest.fixture(scope="module")
-def planner_run(tmp_path_factory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("runs") / "planner"
-    evaluate("planner", out=folder, **FEW)
-    return folder
-
-
-@pytest.fixture(scope="module")
 def map_folder(tmp_path_factory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("maps")
     rng = np.random.default_rng(0)
@@ -211,11 +204,6 @@ class TestResume:
         assert calls == [(40, 40)]
         assert results_of(out) == results_of(tmp_path / "whole")
         assert {path.name for path in out.iterdir()} == RECORDED
-
-    def test_a_finished_run_is_not_run_again(self, random_run):
-        before = files_of(random_run)
-        evaluate("random", out=random_run, resume=True, **FEW)
-        assert files_of(random_run) == before
 
     def test_trajectories_that_are_wanted_later_are_recorded(self, random_run, tmp_path):
         shutil.copytree(random_run, tmp_path / "out")

@@ -103,11 +103,6 @@ class TestResume:
         assert results_of(tmp_path) == results_of(tiny_run)
         assert files_of(tmp_path / "planner") == before
 
-    def test_a_finished_suite_is_not_run_again(self, tiny_run):
-        before = files_of(tiny_run)
-        run_suite("tiny", BOTH, tiny_run, RunOptions(resume=True))
-        assert files_of(tiny_run) == before
-
     def test_an_agent_that_fails_costs_the_others_nothing(self, tiny_run, tmp_path, monkeypatch):
         code = "class Failing(SingleAgent):\n    def act(self, observation):\n        raise RuntimeError('no')\n"
         (tmp_path / "failing_at_hand.py").write_text(IMPORTS + code)

@@ -7,23 +7,15 @@ import pathlib
 import shutil
 
 import pytest
-from run_folders import FEW, files_of, records_of, summary_of
+from run_folders import files_of, records_of, summary_of
 
 from mazebench.errors import InputError
-from mazebench.evaluation.evaluate import evaluate
 from mazebench.results.reading import load_result
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("runs") / "planner"
-    evaluate("planner", out=folder, **FEW)
-    return folder
-
-
 @pytest.fixture
-def copy(run, tmp_path) -> pathlib.Path:
-    shutil.copytree(run, tmp_path / "run")
+def copy(planner_run, tmp_path) -> pathlib.Path:
+    shutil.copytree(planner_run, tmp_path / "run")
     return tmp_path / "run"
 
 
@@ -40,12 +32,12 @@ def assert_refused(folder: pathlib.Path, said: str) -> None:
     assert files_of(folder) == before
 
 
-def test_a_finished_evaluation_is_read(run):
-    result = load_result(run)
-    assert result.folder == run
-    assert json.loads(json.dumps(result.summary.to_dict())) == summary_of(run)
-    assert [json.loads(record.to_line()) for record in result.records] == records_of(run)
-    assert "".join(record.to_line() for record in result.records) == (run / "episodes.jsonl").read_text()
+def test_a_finished_evaluation_is_read(planner_run):
+    result = load_result(planner_run)
+    assert result.folder == planner_run
+    assert json.loads(json.dumps(result.summary.to_dict())) == summary_of(planner_run)
+    assert [json.loads(record.to_line()) for record in result.records] == records_of(planner_run)
+    assert "".join(record.to_line() for record in result.records) == (planner_run / "episodes.jsonl").read_text()
 
 
 def test_what_commands_a_terminal_is_escaped_in_names(copy):

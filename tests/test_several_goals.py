@@ -10,7 +10,6 @@ import pytest
 from run_folders import Killed, kill_after, records_of, results_of, summary_of
 from simple_mazes import field
 
-import mazebench
 from benchmarks.freeze_goals import freeze_goals
 from benchmarks.no_memory import NavigatorWithoutMemory
 from mazebench.agent import SingleAgent
@@ -79,16 +78,6 @@ class TestGoals:
         assert info["steps_left"] == info["time_limit"] == limit(first, third)
         info = step(third)
         assert (info["goal_reached"], info["success"]) == (True, True)
-
-    def test_gymnasium_plays_one_leg_after_the_other(self):
-        env = mazebench.make("rebuilt", level=2, num_goals=3, seed=0)
-        _, info = env.reset()
-        legs, truncated = {}, False
-        while not truncated:
-            legs.setdefault(info["landmark"], info["time_limit"])
-            *_, truncated, info = env.step(4)
-        assert list(legs) == [0, 1, 2]
-        assert info["steps"] == sum(legs.values())
 
 
 class TestRecords:

@@ -124,24 +124,19 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
                 yield _by_distance(f"warp-{level:g}-local-{size}", title, warped, is_warped=True)
 
     # A table of all tracks, with a row for each track and level, and a table of each track and number of goals.
-    groups = {
-        (name, f", {goals} goals" if goals > 1 else ""): group
-        for name in TRACKS
-        for goals, group in episodes[episodes.track == name].groupby("num_goals")
-    }
-    levels = {
-        key: {str(level): at_common_distances(own) for level, own in group.groupby("level")}
-        for key, group in groups.items()
-    }
-    if groups:
-        rows = {f"{name} {level}{goals}": row for (name, goals), of in levels.items() for level, row in of.items()}
+    rows, tables = {}, []
+    for name, track in TRACKS.items():
+        for number, group in episodes[episodes.track == name].groupby("num_goals"):
+            goals = f", {number} goals" if number > 1 else ""
+            own = {str(level): at_common_distances(each) for level, each in group.groupby("level")}
+            meanings = "; ".join(f"{level}: {track.levels[int(level) - 1].meaning}" for level in own)
+            of_facts = {f"{level}, {fact}": row[row[fact]] for level, row in own.items() for fact in facts_of(group)}
+            note, file = f"{track.help} {meanings}.", f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}"
+            tables.append(make_table(file, f"Track {name}{goals}", note, "level", own | of_facts))
+            rows |= {f"{name} {level}{goals}": row for level, row in own.items()}
+    if rows:
         yield make_table("tracks", "Tracks", _DISTANCES_NOTE, "track and level", rows)
-    for (name, goals), group in groups.items():
-        own = levels[name, goals]
-        meanings = "; ".join(f"{level}: {TRACKS[name].levels[int(level) - 1].meaning}" for level in own)
-        of_facts = {f"{level}, {fact}": row[row[fact]] for level, row in own.items() for fact in facts_of(group)}
-        note, file = f"{TRACKS[name].help} {meanings}.", f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}"
-        yield make_table(file, f"Track {name}{goals}", note, "level", own | of_facts)
+    yield from tables
 
 
 def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool = False) -> Table:
