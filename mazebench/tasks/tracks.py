@@ -115,17 +115,17 @@ TRACKS = {
         "The map is drawn by hand, doors have moved since, and the pose is odometry.",
         (
             Level(
-                "bent by up to 0.5 cells, and doors have moved: .45 of the paths are blocked; the start is marked",
+                "bent by up to 0.5 m, and doors have moved: .45 of the paths are blocked; the start is marked",
                 (MovedDoors(percent=45), HandDrawnMap(bend=0.5), LostPose()),
                 odometry_noise=0.01,
             ),
             Level(
-                "bent by up to 1 cell, .7 of the paths are blocked; the start is unknown, too",
+                "bent by up to 1 m, .7 of the paths are blocked; the start is unknown, too",
                 (MovedDoors(percent=70), HandDrawnMap(bend=1.0), LostPose(), HiddenStart()),
                 odometry_noise=0.05,
             ),
             Level(
-                "bent by up to 1.5 cells, .7 of the paths are blocked; mirrored with probability .5, and the odometry "
+                "bent by up to 1.5 m, .7 of the paths are blocked; mirrored with probability .5, and the odometry "
                 "drifts",
                 (
                     MovedDoors(percent=70),
