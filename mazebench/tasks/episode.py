@@ -68,8 +68,10 @@ def goals_of(task: Task, episode: Episode) -> tuple[Cell, ...]:
 
     On a track, each goal after the first one is drawn from the goal before it, so that the shown map can keep all free.
     """
+    if task.track is None or task.options.num_goals == 1:
+        return (episode.goal,)
     goals, rng = [episode.goal], episode.stream(Stream.LATER_GOALS)
-    while task.track is not None and len(goals) < task.options.num_goals:
+    while len(goals) < task.options.num_goals:
         maze, joined = task.mazes[episode.maze], task.joined(episode.maze)
         goals.append(draw_goal(maze, task.distances, goals[-1], rng, joined))
     return tuple(goals)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import functools
 
 import numpy as np
 
@@ -77,9 +78,8 @@ def plan_route(task: Task, episode: Episode, shown: ShownMap) -> Route:
     maze, options = task.mazes[episode.maze], task.options
     if not options.is_hierarchical:
         _, *later = goals_of(task, episode)
-        rng, joined = episode.stream(Stream.LATER_GOALS), task.joined(episode.maze)
-        num_left = options.num_goals - 1
-        legs = _LaterLegs(num_left, maze, task.track, options.time_limit, later, task.distances, joined, rng)
+        num_left, joined = options.num_goals - 1, task.joined(episode.maze)
+        legs = _LaterLegs(num_left, maze, task.track, options.time_limit, later, task.distances, joined, episode)
         return Route([episode.start, episode.goal], legs.limit(episode.start, episode.goal), legs)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     assert options.time_limit is not None  # a task that is no track has one
@@ -97,12 +97,16 @@ class _LaterLegs:
     goals: list[Cell]  # those that were drawn before the episode; others are drawn where their legs start
     distances: tuple[int, ...]  # in cells, one of which is drawn for each goal
     joined: np.ndarray | None  # [N, N] bool, cells that an older map joins; None without one
-    rng: np.random.Generator
+    episode: Episode
+
+    @functools.cached_property
+    def _rng(self) -> np.random.Generator:  # most episodes draw no goal in their course, and it takes long to make
+        return self.episode.stream(Stream.LATER_GOALS)
 
     def next(self, start: Cell) -> tuple[Cell, int]:
         """Returns the goal and the time limit of the next leg, which begins in cell `start`."""
         self.num_left -= 1
-        goal = self.goals.pop(0) if self.goals else draw_goal(self.maze, self.distances, start, self.rng, self.joined)
+        goal = self.goals.pop(0) if self.goals else draw_goal(self.maze, self.distances, start, self._rng, self.joined)
         return goal, self.limit(start, goal)
 
     def limit(self, start: Cell, goal: Cell) -> int:

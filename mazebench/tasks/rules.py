@@ -275,14 +275,26 @@ class Rules:
 
     def info(self, i: int) -> dict[str, Any]:
         """Returns the `infos` of environment i as plain values, in a fraction of the time."""
-        arrays = vars(self)
-        values = {
+        steps = self.steps.item(i)
+        return {
+            "is_first": self.is_first.item(i),
             "success": self.reached.item(i),
+            "goal_reached": self.goal_reached.item(i),
+            "steps": steps,
+            "path_length": self.path_length.item(i),
             "position": self.pose[i, :2].copy(),
             "yaw": wrap_angle(self.pose.item(i, 2)),
-            "steps_left": self._deadline.item(i) - self.steps.item(i),
+            "maze": self.maze.item(i),
+            "landmark": self.landmark.item(i),
+            "time_limit": self.time_limit.item(i),
+            "steps_left": self._deadline.item(i) - steps,
+            "way_left": self.way_left.item(i),
+            "distance": self.distance.item(i),
+            "blocked": self.blocked.item(i),
+            "kind": self.kind[i],
+            "track": self.track[i],
+            "level": self.level.item(i),
         }
-        return {name: values[name] if name in values else arrays[name].item(i) for name in _INFOS}
 
     def close(self) -> None:
         """Closes the sensors."""
