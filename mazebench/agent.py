@@ -47,7 +47,7 @@ class Inputs(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What an agent says of itself after it has acted; None where it says nothing.
+    """An agent's own account of a step that it took; None where it gives none.
 
         >>> mazebench.Report(pose=np.array([[2.5, 3.5, 0.0]])).notes is None
         True

@@ -41,7 +41,7 @@ _CELL = 1e-6  # cells, a tolerance
 
 
 class Change(NamedTuple):
-    """What has changed in a building since its plan was drawn, or a draft of that, and its cost."""
+    """The changes in a building since its plan was drawn, or a draft of them, and their cost."""
 
     walls: np.ndarray  # [N, N] bool
     passages: tuple[Passage, ...]  # that may still change

@@ -133,10 +133,7 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
             of_facts = {f"{level}, {fact}": row[row[fact]] for level, row in own.items() for fact in facts_of(group)}
             if group.mazes.str.startswith("mazes ").any():
                 meanings += "; in mazes of one's own, an older map of them is shown instead of moved doors"
-            note, file = (
-                f"{track.help} {meanings}.",
-                f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}",
-            )
+            note, file = f"{track.help} {meanings}.", f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}"
             tables.append(make_table(file, f"Track {name}{goals}", note, "level", own | of_facts))
             rows |= {f"{name} {level}{goals}": row for level, row in own.items()}
     if rows:

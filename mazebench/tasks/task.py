@@ -37,7 +37,7 @@ _OF_MAZES = ("task", "size", "split", "mazes", "shown", "kinds", "num_mazes", "f
 
 
 class World(NamedTuple):
-    """What a task is played in."""
+    """The mazes that a task is played in, and the maps and ends that belong to them."""
 
     mazes: Mazes
     shown: tuple[OlderMap, ...] | None = None  # older maps of the mazes
