@@ -24,7 +24,7 @@ from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import is_on_time
-from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
+from mazebench.results.reading import SUITE, SUMMARY, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
@@ -45,7 +45,7 @@ class Entry(pydantic.BaseModel):
     checkpoints: tuple[str, ...]  # SHA-256
     on_time: tuple[Share, Share, Share]  # of all episodes, with its 95 % interval
     success: Share  # of all episodes
-    date: datetime.date  # on which the entry was made
+    date: datetime.date  # of the evaluation: that of its newest summary
     parts: dict[str, tuple[Share, Share]]  # on time, and success, by track and level, as "rebuilt 1"
 
 
@@ -85,7 +85,9 @@ def make_tables(entries: Sequence[Entry]) -> str:
         {"agent": names} | {part: [f"{entry.parts[part][index]:.2f}" for entry in entries] for part in PARTS}
         for index in (0, 1)
     )
-    ranks = pd.RangeIndex(1, len(entries) + 1)
+    # Agents with the same on-time rate in two digits share a rank.
+    rates = pd.Series([round(entry.on_time[0], 2) for entry in entries], dtype=float)
+    ranks = pd.Index(rates.rank(method="min", ascending=False).astype(int))
     tables = (
         to_markdown(pd.DataFrame(table, index=ranks).rename_axis(columns="rank"))
         for table in (overall, on_time, success)
@@ -138,7 +140,7 @@ def _make_entry(folder: pathlib.Path) -> Entry:
         checkpoints=tuple(sorted({origin.checkpoint_sha256 for origin in origins if origin.checkpoint_sha256})),
         on_time=(mean.value, mean.low, mean.high),
         success=episodes.success.mean(),
-        date=datetime.datetime.now(tz=datetime.UTC).date(),
+        date=max(datetime.date.fromtimestamp((each.folder / SUMMARY).stat().st_mtime) for each in results),
         parts={part: tuple(parts.loc[part]) for part in PARTS},
     )
 
