@@ -116,8 +116,10 @@ class TestScripts:
     @pytest.mark.parametrize(
         ("agent", "options"),
         [
-            ("PPOAgent", ()),
-            pytest.param("RecurrentPPOAgent", ("--recurrent", "--kinds", "dfs"), marks=pytest.mark.slow),
+            ("FieldPPOAgent", ()),
+            pytest.param("FieldRecurrentPPOAgent", ("--recurrent", "--hide", "map"), marks=pytest.mark.slow),
+            pytest.param("PPOAgent", ("--features", "map", "--track", "rebuilt", "--kinds"), marks=pytest.mark.slow),
+            pytest.param("RecurrentPPOAgent", ("--features", "map", "--recurrent"), marks=pytest.mark.slow),
             pytest.param("PPOAgent", ("--features", "ways"), marks=pytest.mark.slow),
         ],
     )
@@ -132,7 +134,7 @@ class TestScripts:
     @pytest.mark.slow
     def test_sb3_tracks_on_a_task_without_lidar(self, script, command):
         needs("stable_baselines3", "sb3_contrib")
-        script("sb3_tracks.py", *PPO_BUDGET, "--track", "local", "--reward", "progress")
+        script("sb3_tracks.py", *PPO_BUDGET, "--track", "local", "--features", "map")
         which = ("--agent", "sb3_agent:MapPPOAgent", "--checkpoint", "ppo.zip", "--distances", "3", "--kinds", "dfs")
         assert command("eval", *which, "--num-mazes", "2", "--out", "results")[0] == 0
         assert json.loads(pathlib.Path("results", "config.json").read_text())["sensors"] == []

@@ -12,7 +12,8 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 from acting import inputs_of
-from mazebench_agents.integrations.sb3 import MapFeatures, MazeVecEnv, WayFeatures
+from mazebench_agents.integrations.distance_field import DistanceField
+from mazebench_agents.integrations.sb3 import FieldVecEnv, MapFeatures, MazeVecEnv, WayFeatures
 from mazebench_agents.neural_planner.neural_planner import NeuralPlanner
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
@@ -69,6 +70,29 @@ def test_a_policy_learns_from_them(task, reader, num_features):
     assert features.features_dim == num_features
     actions, _ = model.predict(envs.reset())
     assert actions.shape == (4,)
+
+
+def test_features_of_the_distance_field_are_those_of_each_episodes_own_map():
+    envs = FieldVecEnv(MazeVecEnv(mazebench.make_vec("rebuilt", 3, **OPTIONS)))
+    plain = MazeVecEnv(mazebench.make_vec("rebuilt", 3, **OPTIONS))
+    for each in (envs, plain):
+        each.seed(5)
+    found, observations = envs.reset(), plain.reset()
+    field, rng, ended = DistanceField(3), np.random.default_rng(0), 0
+    is_new = np.ones(3, bool)
+    for _ in range(60):
+        field.read(observations["context"], is_new)
+        np.testing.assert_array_equal(found, field.features(observations))
+        assert found.shape == (3, *envs.observation_space.shape)
+        actions = np.where(rng.random(3) < 0.7, 0, rng.integers(6, size=3))
+        found, _, is_new, infos = envs.step(actions)
+        observations, _, _, others = plain.step(actions)
+        for slot in np.flatnonzero(is_new):
+            last = {name: values[None] for name, values in others[slot]["terminal_observation"].items()}
+            expected = field.features(last, np.array([slot]))[0]
+            np.testing.assert_array_equal(infos[slot]["terminal_observation"], expected)
+            ended += 1
+    assert ended
 
 
 def test_ways_are_read_as_by_the_neural_planner():

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from gymnasium.spaces import Box
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from torch import nn
 
 from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, YAW, YAW_RATE, X, Y
@@ -23,6 +24,7 @@ from mazebench.world.simulation import STATE_SIZE
 
 from ..neural_planner.network import NUM_RANGES, REACH, CostPlanner, Situation, motion_features
 from ..neural_planner.neural_planner_config import NeuralPlannerConfig
+from .distance_field import DistanceField
 
 if TYPE_CHECKING:
     from gymnasium import spaces
@@ -92,6 +94,36 @@ class MazeVecEnv(VecEnv):
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         return self.envs.render()
+
+
+class FieldVecEnv(VecEnvWrapper):
+    """Flat observations instead of those of a `MazeVecEnv`: the features of `DistanceField`, for "MlpPolicy".
+
+    >>> envs = FieldVecEnv(MazeVecEnv(mazebench.make_vec(("building", "rebuilt"), 64, reward="progress")))
+    >>> model = PPO("MlpPolicy", envs)
+    """
+
+    venv: MazeVecEnv
+
+    def __init__(self, venv: MazeVecEnv):
+        self.field = DistanceField(venv.num_envs)
+        spaces = venv.envs.single_observation_space.spaces  # type: ignore[attr-defined]  # a Dict
+        size = self.field.num_features(spaces["lidar"].shape[0] if "lidar" in spaces else 0)
+        super().__init__(venv, Box(-np.inf, np.inf, (size,), np.float32))
+
+    def reset(self) -> np.ndarray:
+        observations = self.venv.reset()
+        self.field.read(observations["context"], np.ones(self.num_envs, dtype=bool))
+        return self.field.features(observations)
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        observations, rewards, dones, infos = self.venv.step_wait()
+        # The last observations of episodes are on their own maps, so they come before the new maps are read.
+        for slot in np.flatnonzero(dones):
+            last = {name: values[None] for name, values in infos[slot]["terminal_observation"].items()}
+            infos[slot]["terminal_observation"] = self.field.features(last, np.array([slot]))[0]
+        self.field.read(observations["context"], dones)
+        return self.field.features(observations), rewards, dones, infos
 
 
 class MapFeatures(BaseFeaturesExtractor):

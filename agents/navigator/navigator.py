@@ -65,7 +65,7 @@ class Navigator(Agent):
 
                 # A path over walls and goal as they are estimated now.
                 body = memory.body
-                walls, goal = memory.estimate()
+                walls, goal = self.estimate(memory, inputs, slot)
                 path = plan(walls, goal, memory.cell, self._cell_size) if goal.any() else []
 
                 # It drives along the path, and waits where there is none.
@@ -79,6 +79,10 @@ class Navigator(Agent):
                 memory.command(action, point)
                 actions[slot] = action
         return as_kind(self._kind, actions), state
+
+    def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns what it plans on, `[L, L]` float twice: the probability of a wall, and weights of the goal."""
+        return memory.estimate()
 
     def report(self, state: list[_Robot | None]) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""

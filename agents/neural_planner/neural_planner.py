@@ -155,7 +155,7 @@ class NeuralPlanner(NetworkAgent):
         pose = np.array([(body.x, body.y, body.yaw) for body in bodies]).reshape(-1, 3)
         velocity = np.array([(body.forward, body.left) for body in bodies]).reshape(-1, 2)
         ranges = [
-            ranges_to(robot.grid[1] > 255 * _WALL, *where, NUM_RANGES, REACH)
+            ranges_to(robot.memory.estimate()[0] > _WALL, *where, NUM_RANGES, REACH)
             for robot, where in zip(robots, pose.tolist(), strict=True)
         ]
         actions = np.array([robot.actions for robot in robots]).reshape(-1, 2)

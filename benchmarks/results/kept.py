@@ -33,6 +33,15 @@ WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest
 RECALL = "recall"
 RECALL_AGENTS = ("navigator", "neural-planner")
 RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
+# The navigator that learns all walls once it sees one on its path. It plays `rebuilt` only.
+TOLD = "benchmarks.ceilings:ToldNavigator"
+# The settings whose maps lie as the mazes do, with the same doors moved: those with a true pose and registration.
+_REGISTERED = {
+    "building": ("building-1", "building-1", "building-1"),
+    "rebuilt": ("rebuilt-1", "rebuilt-2", "rebuilt-3"),
+    "adrift": ("rebuilt-2", "rebuilt-2", "rebuilt-3"),
+    "rough": ("rebuilt-1", "rebuilt-2", "rebuilt-2"),
+}
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
@@ -41,8 +50,21 @@ _COLUMNS = ["episode", "maze", "distance", "success", "steps", "oracle_steps", "
 # Archives whose agents have another name than their evaluations.
 _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",
-    "tracks-neural-planner-building": "neural-planner from rewards on building",
+    "tracks-neural-planner-hidden": "neural-planner trained without the map",
+    "tracks-ppo-hidden": "PPO trained without the map",
 }
+
+
+def ceilings(track: str, level: int) -> dict[str, tuple[str, str]]:
+    """Returns agents and settings that know more and more of the truth in a setting, by what they know."""
+    setting, registered = f"{track}-{level}", _REGISTERED[track][level - 1]
+    with_pose = "navigator with the true pose" if TRACKS[track].hides_pose else "navigator"
+    return {
+        "`navigator`": ("navigator", setting),
+        "with the true pose": (with_pose, setting),
+        "and the true registration": ("navigator", registered),
+        "and all walls once blocked": (TOLD if registered.startswith("rebuilt") else "navigator", registered),
+    }
 
 
 class Kept(NamedTuple):

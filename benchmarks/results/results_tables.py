@@ -24,6 +24,7 @@ from benchmarks.results.kept import (
     RECALL_SETTINGS,
     WORST_TENTH,
     Kept,
+    ceilings,
     estimate,
 )
 from mazebench.maps.benchmark import SIZES
@@ -65,11 +66,11 @@ _TRAINED = {
     "random": "`random`",
 }
 _PAIRS = (
+    ("mmn", "mah-long"),
+    ("mmn", "mah"),
     ("mmn-paths", "mmn"),
     ("mmn", "mmn-model-false"),
     ("mmn-model-false", "mah"),
-    ("mmn", "mah"),
-    ("mmn", "mah-long"),
     ("mah", "sb3-her"),
     ("mah", "sb3-ppo"),
     ("sb3-ppo", "dqn"),
@@ -105,7 +106,12 @@ _GLANCE = {
     "navigator": "`navigator`: a classical robot",
     "neural-planner": "`neural-planner`: learned, plans on learned costs",
     "navigator without map": "`navigator` without the map",
-    "sb3_agent:PPOAgent": "PPO, untuned",
+    "sb3_agent:FieldPPOAgent": "PPO of Stable-Baselines3, reads distances on the map",
+}
+# Learned agents, and what was trained by the same recipe with the map hidden.
+_WITHOUT_MAP = {
+    "neural-planner": ("`neural-planner`", "neural-planner trained without the map"),
+    "sb3_agent:FieldPPOAgent": ("PPO", "PPO trained without the map"),
 }
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
@@ -115,11 +121,13 @@ _ROWS = {
     "navigator with the true pose": "`navigator` with the true pose",
     "neural-planner": "`neural-planner`, learned from the oracle",
     "neural-planner from rewards": "`neural-planner`, learned from rewards",
-    "neural-planner from rewards on building": "`neural-planner`, learned from rewards on `building` alone",
+    "dagger:Student": "90-second student of the oracle, reads distances on the map",
+    "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map, progress reward",
+    "sb3_agent:FieldRecurrentPPOAgent": "the same with an LSTM, one run",
     "planner-closed-loop": "`planner-closed-loop`, follows the map",
-    "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
-    "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
-    "sb3_her_agent:LidarHerAgent": "DQN with hindsight of Stable-Baselines3",
+    "sb3_agent:PPOAgent": "PPO, reads the raw map, sparse reward, one run",
+    "sb3_agent:RecurrentPPOAgent": "PPO with an LSTM, reads the raw map, sparse reward, one run",
+    "sb3_her_agent:LidarHerAgent": "DQN with hindsight, reads the raw map, one run",
     "mah": "`mah`, learned, no lidar",
     "dqn": "`dqn`, learned, no map",
     "random": "`random`",
@@ -225,6 +233,53 @@ def tracks_map_worth(kept: Kept) -> str:
     return format_table(["part", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
 
 
+def tracks_learned_worth(kept: Kept) -> str:
+    """Returns the on-time rates of learned agents with the map and of those trained without it, and their difference.
+
+    The latter are evaluated without the map, too.
+    """
+    rows = []
+    for track, level, _ in kept.on_tracks(next(iter(_WITHOUT_MAP))):
+        both = [
+            [kept.of(name, f"{track}-{level}") for name in (agent, _WITHOUT_MAP[agent][1])] for agent in _WITHOUT_MAP
+        ]
+        rows.append([f"`{track}` {level}", *(cell for agents in both for cell in _compared(agents))])
+    names = [name for name, _ in _WITHOUT_MAP.values()]
+    header = [text for name in names for text in (name, f"{name} without the map", f"map worth, {name}")]
+    return format_table(["setting", *header], rows)
+
+
+def tracks_ceilings(kept: Kept) -> str:
+    """Returns the on-time rates of the navigator without the map, and told more and more of the truth."""
+    rows = []
+    for track, level, own in kept.on_tracks("navigator without map"):
+        told = [kept.of(*played) for played in ceilings(track, level).values()]
+        rows.append([f"`{track}` {level}", *(_number(each[ON_TIME_125].mean()) for each in (own, *told))])
+    return format_table(["setting", "`navigator` without the map", *ceilings("building", 1)], rows)
+
+
+def tracks_headroom(kept: Kept) -> str:
+    """Returns each agent's share of the headroom: 0 is the navigator without the map, and 1 the highest ceiling."""
+    rows = []
+    for agent in (
+        "navigator",
+        "neural-planner",
+        "neural-planner from rewards",
+        "dagger:Student",
+        "sb3_agent:FieldPPOAgent",
+    ):
+        shares: dict[str, list[str]] = {track: [] for track in TRACKS}
+        for track, level, own in kept.on_tracks(agent):
+            *_, told = ceilings(track, level).values()
+            low, high = (
+                each[ON_TIME_125].mean()
+                for each in (kept.of("navigator without map", f"{track}-{level}"), kept.of(*told))
+            )
+            shares[track].append(_number((own[ON_TIME_125].mean() - low) / (high - low)))
+        rows.append([_ROWS[agent], *(" / ".join(levels) or "-" for levels in shares.values())])
+    return format_table(["agent", *_TRACKS], rows)
+
+
 def tracks_memory(kept: Kept) -> str:
     """Returns the navigator's share on time at each goal of several, with and without memory, and their difference.
 
@@ -276,7 +331,10 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-on-time-2": lambda kept: by_agent(_ROWS, ON_TIME_2, kept),
     "tracks-learned": lambda kept: tracks_learned("neural-planner", kept),
     "tracks-rewarded": lambda kept: tracks_learned("neural-planner from rewards", kept),
-    "tracks-rewarded-building": lambda kept: tracks_learned("neural-planner from rewards on building", kept),
+    "tracks-ppo": lambda kept: tracks_learned("sb3_agent:FieldPPOAgent", kept),
+    "tracks-learned-worth": tracks_learned_worth,
+    "tracks-ceilings": tracks_ceilings,
+    "tracks-headroom": tracks_headroom,
     "tracks-ways": lambda kept: tracks_learned("mmn-paths", kept),
     "tracks-worst-tenth": lambda kept: by_agent(
         {name: _ROWS[name] for name in ("navigator", "neural-planner", "navigator without map")}, WORST_TENTH, kept
