@@ -38,6 +38,7 @@ from mazebench.tasks.trials import Trial, select_trials
 
 _HIDDEN_POSE = [name for name, track in TRACKS.items() if track.hides_pose]
 # The ideal agent on the grid.
+_EVERY = 4  # of the frozen episodes is driven
 _SIGHT = 3.5  # cells
 _PRICES = tuple(itertools.product((0.0, 3.0), (2.0, 6.0, 15.0, 1e6)))  # of unseen doors: open, closed on the map
 _SAMPLES = 10  # buildings that agree with all that was seen, in which prices are tried
@@ -65,16 +66,23 @@ class ToldNavigator(Navigator):
 
 
 def play(folder: pathlib.Path, split: str = "dev") -> None:
-    """Evaluates the robots, and prints their on-time rates by track and level."""
+    """Evaluates the robots, and prints their on-time rates by track and level; FOLDER/ceilings is to be kept."""
     rates = {}
-    for agent, tracks, exact_pose in (
-        ("navigator", TRACKS, False),
-        ("navigator", _HIDDEN_POSE, True),
-        (TOLD, ["rebuilt"], False),
+    for name, agent, tracks in (
+        ("navigator", "navigator", TRACKS),
+        ("navigator-true-pose", "navigator", _HIDDEN_POSE),
+        ("ceilings", TOLD, ["rebuilt"]),
     ):
         for track, level in itertools.product(tracks, LEVELS):
-            out = folder / (agent + "-true-pose" * exact_pose).rpartition(":")[2] / f"{track}-{level}"
-            summary = evaluate(agent, track, out, level=level, split=split, exact_pose=exact_pose, resume=True)
+            summary = evaluate(
+                agent,
+                track,
+                folder / name / f"{track}-{level}",
+                level=level,
+                split=split,
+                exact_pose=tracks is _HIDDEN_POSE,
+                resume=True,
+            )
             rates[summary.row, f"{track}-{level}"] = summary.overall.on_time["1.25"]
     settings = {(track, level): ceilings(track, level) for track, level in itertools.product(TRACKS, LEVELS)}
     rows = [
@@ -94,7 +102,7 @@ def ideal(split: str = "dev") -> None:
     """
     for level in LEVELS:
         task = Task.of("rebuilt", level=level, split=split)
-        trials, rng = select_trials(task), np.random.default_rng(0)
+        trials, rng = select_trials(task)[::_EVERY], np.random.default_rng(0)
         [moved] = TRACKS["rebuilt"].levels[level - 1].perturbations
         on_time = np.array([float(_is_on_time(task, trial, moved, rng)) for trial in trials])
         mean = mean_interval(on_time, np.array([trial.episode.maze for trial in trials]))
@@ -115,7 +123,9 @@ def _is_on_time(task: Task, trial: Trial, moved: MovedDoors, rng: np.random.Gene
         scores = np.zeros(len(_PRICES))
         for _ in range(_SAMPLES):
             building = _sample(known, shown, num_moved, rng)
-            shortest = _drive(building, building.astype(np.int8), shown, 0.0, 0.0, episode.start, episode.goal, _MOST)[0]
+            shortest = _drive(building, building.astype(np.int8), shown, 0.0, 0.0, episode.start, episode.goal, _MOST)[
+                0
+            ]
             if math.isinf(shortest):
                 continue  # the sampled doors cut the goal off
             for index, prices in enumerate(_PRICES):
@@ -142,16 +152,22 @@ def _drive(
     walls: np.ndarray, known: np.ndarray, shown: np.ndarray, opened: float, closed: float, cell: Cell, goal: Cell,
     most: int,
 ) -> tuple[float, Cell]:  # fmt: skip
-    """Goes the cheapest way, planned anew when a door is seen; returns the cells of way, and the last one.
+    """Goes the cheapest way, planned anew when a door is not as assumed; returns the cells of way, and the last one.
 
     The way ends in the goal, or after `most` cells; it is infinite if none is left. `known` is updated in place.
     """
     size, length = len(walls), 0
     end = np.full(walls.shape, np.inf)
     end[goal] = 0.0
-    is_new = True
+    entering = np.where(known > 0, _WALL, 1.0)
+    for row in range(size):
+        for column in range(size):
+            if known[row, column] < 0:
+                entering[row, column] += closed if shown[row, column] else opened
+    following = cheapest_ways(entering, end)
     while True:
         # What is seen from the cell: unknown cells to which the line is free.
+        is_other = False
         for row in range(max(cell[0] - 3, 0), min(cell[0] + 4, size)):
             for column in range(max(cell[1] - 3, 0), min(cell[1] + 4, size)):
                 down, right = row - cell[0], column - cell[1]
@@ -164,17 +180,16 @@ def _drive(
                             is_seen = False
                             break
                     if is_seen:
-                        known[row, column], is_new = walls[row, column], True
+                        known[row, column] = walls[row, column]
+                        price = _WALL if walls[row, column] else 1.0
+                        is_other |= price != entering[row, column]
+                        entering[row, column] = price
         if cell == goal or length == most:
             return float(length), cell
 
-        if is_new:
-            entering = np.where(known > 0, _WALL, 1.0)
-            for row in range(size):
-                for column in range(size):
-                    if known[row, column] < 0:
-                        entering[row, column] += closed if shown[row, column] else opened
-            following, is_new = cheapest_ways(entering, end), False
+        # The next cell of the cheapest way.
+        if is_other:
+            following = cheapest_ways(entering, end)
         row, column = divmod(following[cell[0] * size + cell[1]], size)
         if known[row, column] > 0:
             return np.inf, cell

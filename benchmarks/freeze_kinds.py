@@ -2,8 +2,7 @@
 
 `python -m benchmarks.freeze_kinds DIR --commit HASH` writes the splits train, dev and eval. The seed of eval is the
 hash of the commit that holds all generators, tracks and agents, which nobody chooses; the manifest has it as
-`eval_commit`. benchmarks/tracks_checks.py has the checks that came before. records/eval_log.md names a first draw that
-was not used.
+`eval_commit`. records/eval_log.md names a first draw that was not used.
 """
 
 from __future__ import annotations
