@@ -46,14 +46,11 @@ def read(ranges: np.ndarray, model: LidarModel, rngs: Sequence[np.random.Generat
       model: the lidar.
       rngs: `[K]`, of each body's episode; each draws 32 normal and 32 uniform numbers. None draws no noise.
     """
-    normal, uniform = np.zeros((len(rngs), NUM_RAYS)), np.ones((len(rngs), NUM_RAYS))
+    from mazebench.world.ray_kernels import measure  # which needs numba
+
+    normal, uniform = np.zeros(ranges.shape), np.ones(ranges.shape)
     for rng, normals, uniforms in zip(rngs, normal, uniform, strict=True):
         if rng is not None:
             rng.standard_normal(out=normals)
             rng.random(out=uniforms)
-    readings = ranges + model.sigma * normal
-    if model.step:
-        readings = model.step * np.rint(readings / model.step)
-    np.clip(readings, model.min_range, model.max_range, out=readings)
-    readings[(ranges >= model.max_range) | (uniform < model.lost)] = model.max_range
-    return readings.astype(np.float32)
+    return measure(ranges, normal, uniform, model.sigma, model.step, model.lost, model.min_range, model.max_range)

@@ -1,0 +1,114 @@
+"""The kernels of the range sensor, compiled: rays through the cells of mazes, and what a sensor makes of their lengths.
+
+`K` is the number of bodies, `R` the number of rays of each, `N` the cells on a side of a maze.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mazebench.kernels import compiled
+
+_PARALLEL = 1e-300  # the least component of a ray, so that the lines it is parallel to are far away but not at infinity
+
+
+@compiled
+def cast(
+    walls: np.ndarray,
+    maze: np.ndarray,
+    pose: np.ndarray,
+    heading: np.ndarray,
+    cosine: np.ndarray,
+    sine: np.ndarray,
+    steps: np.ndarray,
+    cell_size: float,
+    max_range: float,
+) -> np.ndarray:
+    """Returns the distances to the nearest walls along rays, at most `max_range`: `[K, R]` float32, m.
+
+    A ray goes from cell to cell, over the nearer of the next lines of constant x and of constant y (Amanatides and
+    Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987). It is followed in the maze turned by the quarters
+    after which it points to the right and upwards.
+
+    Args:
+      walls: `[mazes, N, N]` bool, with closed borders.
+      maze: `[K]` int, the index of the maze that each body is in.
+      pose: `[K, 3]` float64, x and y in m; the rest is not read.
+      heading: `[K]` float64, the multiple of 2 pi / R that the first ray is turned by beyond the angle `rest`.
+      cosine: `[K]`, of `rest`, which is at least 0 and less than 2 pi / R.
+      sine: `[K]`, likewise.
+      steps: `[R / 4, 2]`, cosines and sines of the multiples of 2 pi / R in a quarter turn.
+      cell_size: m.
+      max_range: m.
+    """
+    size, per_turn = walls.shape[1], len(steps)
+    num_rays, reach = 4 * per_turn, max_range / cell_size
+    is_wall = walls.ravel()
+    ranges = np.empty((len(pose), num_rays), dtype=np.float32)
+    for body in range(len(pose)):
+        # The body's cell, and where the body is in it.
+        x, y = pose[body, 0] / cell_size, pose[body, 1] / cell_size
+        column, level = math.floor(x), math.floor(y)
+        beyond_x, beyond_y = x - column, y - level
+        first_cell = (maze[body] * size + size - 1 - level) * size + column
+
+        # To the right, up, left and down: the cells to the next line, and to the next cell in `is_wall`.
+        gaps = (1.0 - beyond_x, 1.0 - beyond_y, beyond_x, beyond_y)
+        moves = (1, -size, -1, size)
+
+        for number in range(per_turn):
+            # The cells along the ray between two lines of constant x and of constant y, in the turned maze.
+            along_x = cosine[body] * steps[number, 0] - sine[body] * steps[number, 1]
+            along_y = cosine[body] * steps[number, 1] + sine[body] * steps[number, 0]
+            spacing_x, spacing_y = 1.0 / max(along_x, _PARALLEL), 1.0 / max(along_y, _PARALLEL)
+
+            for turn in range(4):
+                cell = first_cell
+                move_x, move_y = moves[turn], moves[(turn + 1) % 4]
+                to_x, to_y = gaps[turn] * spacing_x, gaps[(turn + 1) % 4] * spacing_y
+                while True:
+                    # Enter the cell behind the nearer line.
+                    if to_x < to_y:
+                        distance = to_x
+                        cell += move_x
+                        to_x += spacing_x
+                    else:
+                        distance = to_y
+                        cell += move_y
+                        to_y += spacing_y
+                    # A body that was never placed may stand outside the free cells, and its rays leave the maze.
+                    if is_wall[min(max(cell, 0), len(is_wall) - 1)] or distance >= reach:
+                        break
+                ray = (turn * per_turn + number - int(heading[body])) % num_rays
+                ranges[body, ray] = min(distance * cell_size, max_range)
+    return ranges
+
+
+@compiled
+def measure(
+    ranges: np.ndarray,
+    normal: np.ndarray,
+    uniform: np.ndarray,
+    sigma: float,
+    step: float,
+    lost: float,
+    min_range: float,
+    max_range: float,
+) -> np.ndarray:
+    """Returns what a lidar reads of true distances (`[K, R]`, m): `[K, R]` float32, m.
+
+    `normal` and `uniform` (`[K, R]`) are random numbers. The others are fields of a `LidarModel`.
+    """
+    readings = np.empty(ranges.shape, dtype=np.float32)
+    farthest = np.float32(max_range)
+    for body, ray in np.ndindex(ranges.shape):
+        reading = max_range
+        if ranges[body, ray] < farthest and uniform[body, ray] >= lost:
+            reading = ranges[body, ray] + sigma * normal[body, ray]
+            if step:
+                reading = step * np.rint(reading / step)
+            reading = min(max(reading, min_range), max_range)
+        readings[body, ray] = reading
+    return readings
