@@ -47,11 +47,12 @@ def run(quick: bool) -> dict[str, Any]:
 
 
 def environments(num_envs: Sequence[int] = NUM_ENVS) -> list[Side]:
-    """Returns the bare loop, and the environments in the benchmark's mazes of 13 x 13 cells."""
+    """Returns the bare loop, and the environments in the benchmark's mazes of 13 x 13 cells, but for the track's."""
     task, middle = Task.of(), num_envs[len(num_envs) // 2]
     return [
         Side("bare MuJoCo loop", _bare_loop(task)),
         Side("Gymnasium", _gymnasium(task)),
+        Side("Gymnasium, rebuilt", _gymnasium(Task.of("rebuilt"))),
         *([Side("dm_control", _dm_control(task))] if find_spec("dm_control") else []),  # not for each Python
         *(_vector(f"vector, {count:,}", task, count) for count in num_envs),
         _vector(f"vector, {middle:,}, 1 thread", task, middle, num_threads=1),

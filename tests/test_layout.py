@@ -14,7 +14,8 @@ import gymnasium  # which sets a variable of pygame's
 before = dict(os.environ)
 import mazebench
 is_same = dict(os.environ) == before
-heavy = [name for name in ("mujoco", "dm_control", "torch", "cv2", "scipy", "ray", "matplotlib") if name in sys.modules]
+names = ("mujoco", "dm_control", "torch", "cv2", "scipy", "numba", "ray", "matplotlib")
+heavy = [name for name in names if name in sys.modules]
 import mazebench.cli  # `render` and `bench` choose a backend before MuJoCo reads it
 heavy += [name for name in ("mujoco", "dm_control", "torch") if name in sys.modules]
 print(json.dumps([is_same, heavy]))

@@ -101,6 +101,10 @@ class TestRanges:
         assert (ranges[0], ranges[2 * QUARTER]) == (5.0, 0.5)
         assert ranges.max() == 5.0
 
+    def test_a_body_that_stands_outside_does_no_harm(self):
+        for x, y in ((0.0, 0.0), (-40.0, 2.5), (2.5, -40.0), (1e6, 1e6)):
+            assert ((ranges_of(CORNER, x, y, 1.0) >= 0) & (ranges_of(CORNER, x, y, 1.0) <= MAX_RANGE)).all()
+
     @hypothesis.settings(max_examples=150, deadline=None)
     @hypothesis.given(mazes_and_poses())
     def test_ranges_are_those_of_mujocos_ray_casts(self, maze_and_poses):

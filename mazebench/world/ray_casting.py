@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.maps.drawn import FreshMazes, Mazes
-from mazebench.maps.maze import Maze
 
 NUM_RAYS = 32
 MAX_RANGE = 5.0  # m

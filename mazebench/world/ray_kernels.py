@@ -6,10 +6,14 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mazebench.kernels import compiled
+
+if TYPE_CHECKING:
+    from mazebench.world.ray_casting import LidarModel
 
 _PARALLEL = 1e-300  # the least component of a ray, so that the lines it is parallel to are far away but not at infinity
 
@@ -28,18 +32,18 @@ def cast(
 ) -> np.ndarray:
     """Returns the distances to the nearest walls along rays, at most `max_range`: `[K, R]` float32, m.
 
-    A ray goes from cell to cell, over the nearer of the next lines of constant x and of constant y (Amanatides and
-    Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987). It is followed in the maze turned by the quarters
-    after which it points to the right and upwards.
+    The first ray of a body points straight ahead, the others follow counter-clockwise. A ray goes from cell to cell,
+    over the nearer of the next lines of constant x and of constant y (Amanatides and Woo, A Fast Voxel Traversal
+    Algorithm for Ray Tracing, 1987), in its maze turned by the quarters after which it points to the right and upwards.
 
     Args:
       walls: `[mazes, N, N]` bool, with closed borders.
       maze: `[K]` int, the index of the maze that each body is in.
-      pose: `[K, 3]` float64, x and y in m; the rest is not read.
-      heading: `[K]` float64, the multiple of 2 pi / R that the first ray is turned by beyond the angle `rest`.
-      cosine: `[K]`, of `rest`, which is at least 0 and less than 2 pi / R.
-      sine: `[K]`, likewise.
-      steps: `[R / 4, 2]`, cosines and sines of the multiples of 2 pi / R in a quarter turn.
+      pose: `[K, 3]` float64, of which x and y (m) are read.
+      heading: `[K]` float64, the steps of 2 pi / R from +x to where each body points, rounded down.
+      cosine: `[K]` float64, of the rest of that angle.
+      sine: `[K]` float64, likewise.
+      steps: `[R / 4, 2]` float64, the cosines and sines of 0, 1, ... steps.
       cell_size: m.
       max_range: m.
     """
@@ -87,28 +91,16 @@ def cast(
 
 
 @compiled
-def measure(
-    ranges: np.ndarray,
-    normal: np.ndarray,
-    uniform: np.ndarray,
-    sigma: float,
-    step: float,
-    lost: float,
-    min_range: float,
-    max_range: float,
-) -> np.ndarray:
-    """Returns what a lidar reads of true distances (`[K, R]`, m): `[K, R]` float32, m.
+def measure(ranges: np.ndarray, normal: np.ndarray, uniform: np.ndarray, model: LidarModel) -> np.ndarray:
+    """Returns what a lidar of a model reads of true distances (`[K, R]` float32, m): `[K, R]` float32, m.
 
-    `normal` and `uniform` (`[K, R]`) are random numbers. The others are fields of a `LidarModel`.
+    `normal` and `uniform` (`[K, R]` float64) are random numbers.
     """
     readings = np.empty(ranges.shape, dtype=np.float32)
-    farthest = np.float32(max_range)
-    for body, ray in np.ndindex(ranges.shape):
-        reading = max_range
-        if ranges[body, ray] < farthest and uniform[body, ray] >= lost:
-            reading = ranges[body, ray] + sigma * normal[body, ray]
-            if step:
-                reading = step * np.rint(reading / step)
-            reading = min(max(reading, min_range), max_range)
-        readings[body, ray] = reading
+    for ray in np.ndindex(ranges.shape):
+        reading = float(ranges[ray]) + model.sigma * float(normal[ray])
+        if model.step:
+            reading = model.step * round(reading / model.step)
+        is_lost = ranges[ray] >= np.float32(model.max_range) or uniform[ray] < model.lost
+        readings[ray] = model.max_range if is_lost else min(max(reading, model.min_range), model.max_range)
     return readings

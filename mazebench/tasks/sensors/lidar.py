@@ -53,4 +53,4 @@ def read(ranges: np.ndarray, model: LidarModel, rngs: Sequence[np.random.Generat
         if rng is not None:
             rng.standard_normal(out=normals)
             rng.random(out=uniforms)
-    return measure(ranges, normal, uniform, model.sigma, model.step, model.lost, model.min_range, model.max_range)
+    return measure(ranges, normal, uniform, model)
