@@ -14,9 +14,6 @@ from mazebench.maps.drawn import FreshMazes, Mazes
 NUM_RAYS = 32
 MAX_RANGE = 5.0  # m
 
-_STEP = 2 * np.pi / NUM_RAYS  # rad, from one ray to the next
-_QUARTER = np.arange(NUM_RAYS // 4) * _STEP
-_STEPS = np.stack([np.cos(_QUARTER), np.sin(_QUARTER)], axis=1)  # [8, 2]
 _NUM_FRESH = 512  # fresh mazes whose walls are kept
 
 
@@ -47,7 +44,7 @@ def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     The first ray of a body with the pose x, y (m) and yaw (rad), `[3]`, points straight ahead. The others follow
     counter-clockwise at equal angles.
     """
-    angles = pose[2] + np.arange(NUM_RAYS) * _STEP
+    angles = pose[2] + np.arange(NUM_RAYS) * (2 * np.pi / NUM_RAYS)
     return pose[:2] + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
@@ -91,10 +88,5 @@ class Lidar:
         """
         from mazebench.world.ray_kernels import cast  # which needs numba
 
-        yaw = pose[:, 2]
-        heading = np.floor(yaw / _STEP)  # in steps, rounded down
-        rest = yaw - heading * _STEP
         index = self._indices(maze)  # before `_walls` is read, which it may change
-        # NumPy's cosine and sine may have other last bits than those of kernels.
-        cosine, sine = np.cos(rest), np.sin(rest)
-        return cast(self._walls, index, pose, heading, cosine, sine, _STEPS, self._cell_size, self._max_range)
+        return cast(self._walls, index, pose, NUM_RAYS, self._cell_size, self._max_range)

@@ -20,15 +20,7 @@ _PARALLEL = 1e-300  # the least component of a ray, so that the lines it is para
 
 @compiled
 def cast(
-    walls: np.ndarray,
-    maze: np.ndarray,
-    pose: np.ndarray,
-    heading: np.ndarray,
-    cosine: np.ndarray,
-    sine: np.ndarray,
-    steps: np.ndarray,
-    cell_size: float,
-    max_range: float,
+    walls: np.ndarray, maze: np.ndarray, pose: np.ndarray, num_rays: int, cell_size: float, max_range: float
 ) -> np.ndarray:
     """Returns the distances to the nearest walls along rays, at most `max_range`: `[K, R]` float32, m.
 
@@ -39,19 +31,22 @@ def cast(
     Args:
       walls: `[mazes, N, N]` bool, with closed borders.
       maze: `[K]` int, the index of the maze that each body is in.
-      pose: `[K, 3]` float64, of which x and y (m) are read.
-      heading: `[K]` float64, the steps of 2 pi / R from +x to where each body points, rounded down.
-      cosine: `[K]` float64, of the rest of that angle.
-      sine: `[K]` float64, likewise.
-      steps: `[R / 4, 2]` float64, the cosines and sines of 0, 1, ... steps.
+      pose: `[K, 3]` float64, x, y (m) and yaw (rad, not wrapped).
+      num_rays: R, a multiple of 4.
       cell_size: m.
       max_range: m.
     """
-    size, per_turn = walls.shape[1], len(steps)
-    num_rays, reach = 4 * per_turn, max_range / cell_size
+    size, per_turn, reach = walls.shape[1], num_rays // 4, max_range / cell_size
+    step = 2 * math.pi / num_rays  # rad, from one ray to the next
+    cosines, sines = np.cos(np.arange(per_turn) * step), np.sin(np.arange(per_turn) * step)
     is_wall = walls.ravel()
     ranges = np.empty((len(pose), num_rays), dtype=np.float32)
     for body in range(len(pose)):
+        # Where the body points: in steps, rounded down, and the rest.
+        yaw = pose[body, 2]
+        heading = math.floor(yaw / step)
+        cosine, sine = math.cos(yaw - heading * step), math.sin(yaw - heading * step)
+
         # The body's cell, and where the body is in it.
         x, y = pose[body, 0] / cell_size, pose[body, 1] / cell_size
         column, level = math.floor(x), math.floor(y)
@@ -64,8 +59,8 @@ def cast(
 
         for number in range(per_turn):
             # The cells along the ray between two lines of constant x and of constant y, in the turned maze.
-            along_x = cosine[body] * steps[number, 0] - sine[body] * steps[number, 1]
-            along_y = cosine[body] * steps[number, 1] + sine[body] * steps[number, 0]
+            along_x = cosine * cosines[number] - sine * sines[number]
+            along_y = cosine * sines[number] + sine * cosines[number]
             spacing_x, spacing_y = 1.0 / max(along_x, _PARALLEL), 1.0 / max(along_y, _PARALLEL)
 
             for turn in range(4):
@@ -85,7 +80,7 @@ def cast(
                     # A body that was never placed may stand outside the free cells, and its rays leave the maze.
                     if is_wall[min(max(cell, 0), len(is_wall) - 1)] or distance >= reach:
                         break
-                ray = (turn * per_turn + number - int(heading[body])) % num_rays
+                ray = (turn * per_turn + number - heading) % num_rays
                 ranges[body, ray] = min(distance * cell_size, max_range)
     return ranges
 

@@ -48,9 +48,11 @@ def read(ranges: np.ndarray, model: LidarModel, rngs: Sequence[np.random.Generat
     """
     from mazebench.world.ray_kernels import measure  # which needs numba
 
-    normal, uniform = np.zeros(ranges.shape), np.ones(ranges.shape)
-    for rng, normals, uniforms in zip(rngs, normal, uniform, strict=True):
-        if rng is not None:
-            rng.standard_normal(out=normals)
-            rng.random(out=uniforms)
+    normal, uniform = np.empty((2, *ranges.shape))
+    for i, rng in enumerate(rngs):
+        if rng is None:
+            normal[i], uniform[i] = 0.0, 1.0
+        else:
+            rng.standard_normal(out=normal[i])
+            rng.random(out=uniform[i])
     return measure(ranges, normal, uniform, model)
