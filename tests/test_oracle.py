@@ -44,7 +44,7 @@ class TestMotion:
     def test_a_step_is_that_of_the_world_also_in_contact_with_walls(self, cell_size):
         maze = dfs(0, cell_size=cell_size)
         walls = np.ascontiguousarray(maze.walls[::-1].T)
-        simulation = MujocoSimulation(models_of((maze,), False)[0])
+        simulation = MujocoSimulation(models_of((maze,))[0])
         rng = np.random.default_rng(1)
         action, errors = 0, []
         for _ in range(1000):

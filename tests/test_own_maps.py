@@ -61,7 +61,7 @@ class TestScale:
         maze = dfs()
         paths = []
         for each in (maze, doubled(maze)):
-            simulation = MujocoSimulation(models_of((each,), False)[0])
+            simulation = MujocoSimulation(models_of((each,))[0])
             with simulation.reset_context():
                 simulation.place_agent(maze.point(maze.free_cells[0]), 0.3)
             path = []

@@ -9,7 +9,7 @@ import typer
 
 from mazebench import stopping
 from mazebench.commands import progress
-from mazebench.commands.display import has_camera, load_mujoco
+from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.options import options_in
@@ -32,7 +32,7 @@ def collect(
     ] = False,
 ) -> None:
     """Collect demonstrations of an agent on training mazes, as a Minari data set."""
-    load_mujoco(renders=has_camera(values.get("sensors", ())))
+    load_mujoco(renders=False)
     from mazebench.evaluation.collect import collect_demonstrations
 
     task, run = TaskOptions(**options_in(values, TaskOptions)), RunOptions(**options_in(values, RunOptions))

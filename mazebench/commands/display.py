@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 
-from mazebench.tasks.sensors import SENSORS
-from mazebench.tasks.sensors.cameras import CameraSensor
 from mazebench.world import backend
 
 
@@ -27,8 +24,3 @@ def load_mujoco(renders: bool) -> None:
         if renders:
             raise
         os.environ["MUJOCO_GL"] = "off"  # in worker processes too
-
-
-def has_camera(sensors: Iterable[str]) -> bool:
-    """Returns whether one of the sensors with these names is a camera; unknown names are none."""
-    return any(SENSORS.get(name) is CameraSensor for name in sensors)

@@ -12,7 +12,7 @@ import typer
 
 from mazebench import stopping
 from mazebench.commands import progress
-from mazebench.commands.display import has_camera, load_mujoco
+from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
@@ -58,7 +58,7 @@ def evaluate(
     run = RunOptions(**options_in(values, RunOptions))
     if run.resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
-    load_mujoco(renders=has_camera(values.get("sensors", ())))
+    load_mujoco(renders=False)
 
     from mazebench.commands.summary_table import print_suite, print_summary
     from mazebench.evaluation.evaluate import run_evaluation

@@ -10,12 +10,13 @@ from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options, watched_task
 from mazebench.errors import InputError
 from mazebench.tasks.sensors import LIDAR
+from mazebench.tasks.sensors.sensor import CAMERA_OPTIONS
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.backend import has_display
 
 
-@takes_options(TaskOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", "actions", "camera_size", "textures"])
+@takes_options(TaskOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", "actions", *CAMERA_OPTIONS])
 def play(
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,

@@ -9,7 +9,7 @@ import typer
 
 from mazebench import stopping
 from mazebench.commands import progress
-from mazebench.commands.display import has_camera, load_mujoco
+from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
@@ -36,7 +36,7 @@ def train(
     ] = None,
 ) -> None:
     """Train an agent, on the benchmark's training mazes or others; evaluated on held-out mazes of the same kinds."""
-    load_mujoco(renders=has_camera(values.get("sensors", ())))
+    load_mujoco(renders=False)
     from mazebench.training import loop, run_folder
 
     parsed = {}

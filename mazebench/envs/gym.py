@@ -105,7 +105,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         if self.render_mode is None:
             return None
         if self._cameras is None:
-            self._cameras = Cameras(models_of(self.task.mazes, self.task.options.textures), (self._camera,))
+            self._cameras = Cameras(models_of(self.task.mazes), (self._camera,))
         data = self.simulation.data
         return self._cameras.take(self.runner.rules.maze.item(), data.qpos, data.mocap_pos[0])[self._camera]
 

@@ -76,7 +76,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
           task: the task, or those of several tracks; the attribute of this name is the first one.
           num_envs: B.
           seed: of the first reset, as in `reset`.
-          num_threads: of the simulation; 0 uses all cores.
+          num_threads: of the simulation and the cameras; 0 uses all cores.
           render_mode: None or "rgb_array", for Gymnasium's wrappers.
           episode_source: returns the next episode of an environment; by default each draws from a stream of its own.
           autoreset_mode: one of Gymnasium's three, or its value: "SameStep", "NextStep" or "Disabled".
@@ -106,7 +106,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._episode_source = episode_source
         self._tasks = tasks  # of which each episode draws one
         self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
-        self.rules = Rules(task, num_envs)
+        self.rules = Rules(task, num_envs, arguments.num_threads)
         self.episodes = self.rules.episodes
         self._was_reset = False
         self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
@@ -317,7 +317,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(models_of(self.task.mazes, self.task.options.textures), ("top",))
+            self._top_camera = Cameras(models_of(self.task.mazes), ("top",))
         worlds = zip(self.rules.maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 

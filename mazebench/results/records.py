@@ -33,7 +33,7 @@ Cell = tuple[Count, Count]
 # The options of a task, as JSON has them.
 StoredTask = Annotated[
     pydantic.InstanceOf[TaskOptions],
-    pydantic.BeforeValidator(lambda task: TaskOptions.of(task) if isinstance(task, dict) else task),
+    pydantic.BeforeValidator(lambda task: TaskOptions.from_json(task) if isinstance(task, dict) else task),
 ]
 # Results of others may have any name; what does not print, such as commands to a terminal, is escaped.
 Name = Annotated[str, pydantic.Field(min_length=1, max_length=1000), pydantic.AfterValidator(one_line)]

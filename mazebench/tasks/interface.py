@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from mazebench.constants import VELOCITIES
+from mazebench.world.looks import Camera
 from mazebench.world.ray_casting import LidarModel
 
 
@@ -20,6 +21,7 @@ class Interface:
     cell_size: float = 1.0  # m, the side of a cell of the mazes
     hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
     lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
+    camera: Camera | None = None  # of the sensors egocentric, depth and labels; None without them
     odometry_noise: float = 0.0  # alpha of `mazebench.tasks.perturbations.odometry.NoisyMotion`
 
     @property

@@ -19,6 +19,7 @@ from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.angles import wrap_angle
+from mazebench.world.looks import VARIED
 
 _UNKNOWN = -1  # a way that would take long to measure
 _INFOS = (  # what `Rules.infos` describes, in this order
@@ -55,8 +56,8 @@ class Rules:
     - context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
     - is_first: bool, only in dm_env and if episodes may have several legs: whether this context is new. Gymnasium's
       environments have it in `info`.
-    - egocentric, top, chase: `[H, H, 3]` uint8, if `sensors` names them: pictures of the true world, with a marker at
-      the goal.
+    - egocentric, depth, labels: `[H, H, 3]` uint8, `[H, H]` float32 (m, at most 10) and `[H, H]` uint8 (0 sky, 1 floor,
+      2 wall, 3 goal), if `sensors` names them: pictures of the true world, with a disc at the goal.
     - lidar: `[32]` float32, if `sensors` names it: metres from the body's centre to the nearest wall of the true maze,
       at most 5, along horizontal rays; the first straight ahead, then counter-clockwise every 360 / 32 degrees. With
       `lidar_noise`, they are noisy, and may reach less far.
@@ -69,8 +70,9 @@ class Rules:
     entered on the last step is reached.
     """
 
-    def __init__(self, task: Task, num_envs: int):
+    def __init__(self, task: Task, num_envs: int, num_threads: int = 1):
         self.task = task
+        self._num_threads = num_threads  # of the sensors; 0 for all cores
         self._sensors = OpenSensors(task)
 
         # The episodes; those of an environment that has none, or none yet, are None.
@@ -79,6 +81,7 @@ class Rules:
         self.routes: list[Route | None] = [None] * num_envs
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
+        self._picture_noise: list[np.random.Generator | None] = [None] * num_envs
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
         self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", task.track or ""))
         self.blocked = np.zeros(num_envs, dtype=bool)
@@ -110,7 +113,7 @@ class Rules:
         """
         self.episodes[i], self.active[i] = episode, episode is not None
         self.is_first[i] = self.reached[i] = self.timed_out[i] = self.goal_reached[i] = False
-        self._state_errors[i], self._lidar_noise[i] = [], None
+        self._state_errors[i], self._lidar_noise[i], self._picture_noise[i] = [], None, None
         if episode is None:
             return
 
@@ -121,6 +124,8 @@ class Rules:
         self._state_errors[i] = state_errors(task, episode)
         if "lidar" in task.sensors and task.options.lidar.is_random:
             self._lidar_noise[i] = episode.stream(Stream.LIDAR_NOISE)
+        if task.options.look == VARIED:
+            self._picture_noise[i] = episode.stream(Stream.PICTURE_NOISE)
 
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
@@ -242,8 +247,8 @@ class Rules:
                     add_error(state)
         observed = {"state": states.astype(np.float32)}
         if self.task.sensors:
-            noise = [self._lidar_noise[i] for i in indices.tolist()]
-            worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], noise)
+            noise = [[noise[i] for i in indices.tolist()] for noise in (self._lidar_noise, self._picture_noise)]
+            worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], *noise, self._num_threads)
             observed |= self._sensors.read(worlds)
         return observed
 

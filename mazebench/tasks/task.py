@@ -90,7 +90,7 @@ class Task:
         Raises:
           InputError: as `of`.
         """
-        return resolve(TaskOptions.of(content))
+        return resolve(TaskOptions.from_json(content))
 
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has."""
@@ -186,6 +186,7 @@ class Task:
             cell_size=self.cell_size,
             hidden=self.options.hide,
             lidar=self.options.lidar if LIDAR in self.sensors else None,
+            camera=self.options.camera if {*self.sensors} - {LIDAR} else None,
             odometry_noise=max(map(self.odometry_noise_at, self.levels or LEVELS[:1])),
         )
 
@@ -471,8 +472,6 @@ def _check_mazes(asked: TaskOptions, world: World) -> None:
     """Raises `InputError` if mazes are not of one size and scale, or the task can't be played in one of them."""
     mazes = world.mazes
     if isinstance(mazes, FreshMazes):
-        if asked.textures:
-            raise InputError("fresh mazes: expected no textures, which take long to make, found textures")
         for name in ENDS:
             if (end := getattr(asked, name)) is not None:
                 raise InputError(f"fresh mazes: expected no {name}, which may be a wall in one of them, found {end!r}")

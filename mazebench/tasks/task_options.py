@@ -32,7 +32,7 @@ from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_i
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
 from mazebench.tasks.sensors import LIDAR, SENSORS
-from mazebench.tasks.sensors.sensor import SensorOptions
+from mazebench.tasks.sensors.sensor import CAMERA_OPTIONS, SensorOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
@@ -47,9 +47,9 @@ MOST_GOALS = 5  # of an episode on a track, all of which its shown map keeps fre
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
-_SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
+_RETIRED = (("textures", False),)  # options of earlier versions, and the values that said nothing
 # Fields that an agent may choose, or is not told, while the same is played.
-_OF_AGENTS = ("actions", "sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
+_OF_AGENTS = ("actions", "sensors", *CAMERA_OPTIONS, "hide", "exact_pose", "context_size")
 
 
 def _as_mazes(mazes: Any) -> Any:
@@ -241,11 +241,20 @@ class TaskOptions(SensorOptions, ReadOptions):
             object.__setattr__(self, "sensors", (LIDAR, *self.sensors))
         self._check()
 
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Self:
+        """Returns the options of which `to_json` returned the content, here or in an earlier version.
+
+        Raises:
+          InputError: if there is no such option, or a value is not allowed.
+        """
+        return cls.of({name: value for name, value in content.items() if (name, value) not in _RETIRED})
+
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
-        values = {name: value for name, value in vars(self).items() if value is not None}
-        if self.reward == SPARSE:
-            del values["reward"]
+        changed = self.changed()
+        left = {name for name in ("reward", *CAMERA_OPTIONS) if name not in changed}
+        values = {name: value for name, value in vars(self).items() if value is not None and name not in left}
         if self.mazes is not None:  # a path may have bytes that JSON has not
             own = self.mazes
             values["mazes"] = one_line(own) if isinstance(own, str) else [described_maze(maze) for maze in own]
@@ -327,6 +336,11 @@ class TaskOptions(SensorOptions, ReadOptions):
     def lidar(self) -> LidarModel:
         """The model of the sensor `lidar`: as the option says, or the track."""
         return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
+
+    @property
+    def is_unseen(self) -> bool:
+        """True if mazes have patterns that training mazes don't have: those of other splits than train."""
+        return self.split not in (None, "train")
 
     def ends(self, maze: Maze, older: OlderMap | None = None) -> tuple[Cell | None, Cell | None]:
         """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
@@ -496,10 +510,8 @@ class TaskOptions(SensorOptions, ReadOptions):
             raise InputError(f"{hidden}: expected the task 'local' or a track, found {self.task!r}")
         self._require(hidden, num_goals=1)
         cameras = [name for name in self.sensors if name != LIDAR]
-        telling = cameras if "goal" in self.hide else [name for name in cameras if name != "egocentric"]
-        if telling:
-            what = "where the goal is" if "goal" in self.hide else "the maze from above"
-            raise InputError(f"{hidden}: expected sensors without {telling[0]!r}, which shows {what}")
+        if cameras and "goal" in self.hide:
+            raise InputError(f"{hidden}: expected sensors without {cameras[0]!r}, which shows where the goal is")
 
     def _check_track(self) -> None:
         """Raises `InputError` if an option contradicts the track."""
@@ -518,6 +530,3 @@ class TaskOptions(SensorOptions, ReadOptions):
             raise InputError(f"{beside}: expected num_goals of at most {most}, found {self.num_goals}")
         if self.exact_pose and not track.hides_pose:
             raise InputError(f"{beside}: expected no exact_pose, for the pose is exact; it belongs to lost poses")
-        for sensor in _SHOWING_POSE if track.hides_pose else ():
-            if sensor in self.sensors:
-                raise InputError(f"{beside}: expected sensors without {sensor!r}, which shows where the body is")

@@ -12,8 +12,7 @@ import mujoco
 import numpy as np
 
 from mazebench.maps.drawn import Mazes
-from mazebench.world.mjcf import has_whole_model, largest_spec, maze_spec, require_whole, wall_boxes
-from mazebench.world.textures import add_textures
+from mazebench.world.mjcf import has_whole_model, largest_spec, require_whole, wall_boxes
 
 _MOST_SHOWN = 500_000  # things in the models that are kept, some 1 kB each
 
@@ -35,15 +34,14 @@ class Seen(NamedTuple):
 class MazeModels:
     """The models that show some mazes, whole where a maze has a whole model; those used last are kept."""
 
-    def __init__(self, mazes: Mazes, textures: bool = False):
-        """With `textures`, the models have the textured look, which only pictures need."""
-        self._mazes, self._textures = mazes, textures
+    def __init__(self, mazes: Mazes):
+        self._mazes = mazes
         self._kept: dict[int, Seen] = {}  # the one used last at the end
         self._num_shown = 0
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Makes copies share the models, and pickles hold the mazes only."""
-        return models_of, (self._mazes, self._textures)
+        return models_of, (self._mazes,)
 
     def __getitem__(self, index: int) -> mujoco.MjModel:
         """Returns the whole model of maze number `index`; whoever changes it copies it.
@@ -55,17 +53,10 @@ class MazeModels:
         return self.seen(index).model
 
     def seen(self, index: int) -> Seen:
-        """Returns what shows maze number `index`.
-
-        Raises:
-          InputError: if textures are wanted of a maze that has too many boxes for a whole model.
-        """
+        """Returns what shows maze number `index`."""
         if (found := self._kept.pop(index, None)) is None:
             maze = self._mazes[index]
-            spec = maze_spec(maze) if self._textures else largest_spec(maze)
-            if self._textures:
-                add_textures(spec, maze)
-            model = spec.compile()
+            model = largest_spec(maze).compile()
             lacking = np.zeros((2, 0, 3)) if has_whole_model(maze) else wall_boxes(maze)
             found = Seen(model, mujoco.MjData(model), *lacking)
             self._num_shown += found.num_shown
@@ -76,6 +67,6 @@ class MazeModels:
 
 
 @functools.lru_cache(maxsize=8)
-def models_of(mazes: Mazes, textures: bool, /) -> MazeModels:
+def models_of(mazes: Mazes, /) -> MazeModels:
     """Returns the models of `mazes`, which all environments with these mazes share."""
-    return MazeModels(mazes, textures)
+    return MazeModels(mazes)

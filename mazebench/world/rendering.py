@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import copy
 import weakref
 from collections.abc import Iterator, Sequence
 
@@ -19,19 +18,13 @@ _PICTURE_SIZE = 480  # pixels a side
 
 
 class Cameras:
-    """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them.
+    """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them."""
 
-    All pictures have the textures of the first model, which the context holds.
-    """
-
-    def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, smooth: bool = True):
-        """`names` are of `CAMERAS`, `pixels` is the side of a picture.
-
-        Edges are stepped unless `smooth`: without a GPU, smoothing takes four fifths of the time of a small picture.
-        """
+    def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE):
+        """`names` are of `CAMERAS`, `pixels` is the side of a picture."""
         self._renderer: mujoco.Renderer | None = None
         self._models = models
-        self._names, self._pixels, self._smooth = names, pixels, smooth
+        self._names, self._pixels = names, pixels
         self._most_shown = 0  # geoms and sites that the context has room for
         self._added: Seen | None = None  # whose boxes the scene has
 
@@ -71,11 +64,10 @@ class Cameras:
 
     def _open(self, most_shown: int) -> mujoco.Renderer:
         self._most_shown, self._added = most_shown, None
-        model = copy.copy(self._models.seen(0).model)
-        if not self._smooth:
-            model.vis.quality.offsamples = 0
         with opening_context():
-            renderer = mujoco.Renderer(model, self._pixels, self._pixels, max_geom=self._most_shown)
+            renderer = mujoco.Renderer(
+                self._models.seen(0).model, self._pixels, self._pixels, max_geom=self._most_shown
+            )
 
         # The cameras close before the interpreter unloads the modules that closing needs. Exit functions run in reverse
         # order: registered again after a context is opened, this one runs before the backend's.

@@ -7,7 +7,6 @@ about the place on the map.
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from typing import NamedTuple
 
@@ -16,6 +15,7 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from mazebench.maps.maze import WALL_HEIGHT, Maze
+from mazebench.world.looks import rng_of
 
 _CELLS_PER_REGION = 7
 _OFFSET = 0.002  # m, from a wall to its face
@@ -108,7 +108,7 @@ def _surfaces(maze: Maze) -> np.ndarray:
 
     Regions next to each other have different surfaces if that can be, and all surfaces are used about equally often.
     """
-    rng = np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+    rng = rng_of(maze)
 
     # Regions: the cells nearest to each of some sites.
     num_cells, graph = len(maze.free_cells), maze.graph

@@ -9,7 +9,7 @@ from mazebench.tasks.sensors.sensor import Sensor
 LIDAR = "lidar"  # the sensor that every track offers
 SENSORS: dict[str, type[Sensor]] = {
     "egocentric": CameraSensor,
-    "top": CameraSensor,
-    "chase": CameraSensor,
+    "depth": CameraSensor,
+    "labels": CameraSensor,
     LIDAR: LidarSensor,
 }

@@ -1,4 +1,4 @@
-"""Pictures of the true world, the goal marker in it, as observations."""
+"""What the agent's camera sees of the true world, the goal's disc in it, as observations."""
 
 from __future__ import annotations
 
@@ -7,31 +7,43 @@ from dm_env import specs
 
 from mazebench.maps.drawn import Mazes
 from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
+from mazebench.world.looks import EXPOSURES, LABELS, MAX_DEPTH, NUM_NOISE
+
+_NO_NOISE = -1
 
 
 class CameraSensor(Sensor):
-    """The cameras of the maze's model, all of them through one rendering context, which the first picture opens."""
+    """Colours, depths and labels from one camera, which draws all of them at once."""
 
     @classmethod
     def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
-        return specs.BoundedArray((options.camera_size, options.camera_size, 3), np.uint8, 0, 255, name)
+        shape = (options.camera_size, options.camera_size)
+        if name == "egocentric":
+            return specs.BoundedArray((*shape, 3), np.uint8, 0, 255, name)
+        if name == "depth":
+            return specs.BoundedArray(shape, np.float32, 0.0, MAX_DEPTH, name)
+        return specs.BoundedArray(shape, np.uint8, 0, len(LABELS) - 1, name)
 
     def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: Mazes):
-        # Imported here: who only reads a task's options, such as the command line, shall not load MuJoCo.
-        from mazebench.world.models import models_of
-        from mazebench.world.rendering import Cameras
+        # Imported here: who only reads a task's options, such as the command line, shall not load numba.
+        from mazebench.world.ray_camera import RayCamera
 
         self._names = names
-        self._cameras = Cameras(models_of(mazes, options.textures), names, options.camera_size, smooth=False)
+        self._camera = RayCamera(mazes, options.camera, options.look, options.is_unseen)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
-        """Returns `[K, H, H, 3]` uint8 by name.
-
-        Raises:
-          RenderingError: if no rendering context can be opened.
-        """
-        pictures = [self._cameras.take(*world) for world in zip(worlds.maze, worlds.pose, worlds.marker, strict=True)]
-        return {name: np.stack([taken[name] for taken in pictures]) for name in self._names}
+        """Returns `[K, H, H, 3]` uint8, `[K, H, H]` float32 (m) or `[K, H, H]` uint8 by name."""
+        exposure = np.ones(len(worlds.pose), dtype=np.float32)
+        noise = np.full(len(worlds.pose), _NO_NOISE)
+        if "egocentric" in self._names:
+            darkest, brightest = np.log(EXPOSURES)
+            for i, rng in enumerate(worlds.picture_noise):
+                if rng is not None:
+                    exposure[i] = np.exp(rng.uniform(darkest, brightest))
+                    noise[i] = rng.integers(NUM_NOISE)
+        return self._camera.take(
+            self._names, worlds.maze, worlds.pose, worlds.marker, exposure, noise, worlds.num_threads
+        )
 
     def close(self) -> None:
-        self._cameras.close()
+        self._camera.close()

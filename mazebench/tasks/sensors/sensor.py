@@ -14,9 +14,11 @@ from dm_env import specs
 from mazebench.constants import MAX_PIXELS
 from mazebench.errors import InputError
 from mazebench.maps.drawn import Mazes
-from mazebench.options import Doc, Options, ReadBy
+from mazebench.options import Doc, OneOf, Options, ReadBy
+from mazebench.world.looks import LOOKS, PLAIN, Camera
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
+CAMERA_OPTIONS = ("camera_size", "camera_fov", "camera_height", "camera_offset", "camera_pitch", "look")
 _NAMED = {"turtlebot3": TURTLEBOT3}
 
 
@@ -43,8 +45,29 @@ def noise_text(text: object) -> str | None:
 class SensorOptions(Options):
     """The options that sensors read."""
 
-    camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a camera's picture.")] = 64
-    textures: Annotated[bool, Doc("Walls in pictures have patterns and colours that tell places apart.")] = False
+    camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a picture.")] = Camera().size
+    camera_fov: Annotated[
+        float,
+        Interval(ge=10, le=360),
+        Doc("Degrees from the left to the right of a picture; above 120, its columns are at equal angles."),
+    ] = Camera().fov
+    camera_height: Annotated[float, Interval(ge=0.1, le=0.9), Doc("Metres of the camera above the floor.")] = (
+        Camera().height
+    )
+    camera_offset: Annotated[
+        float, Interval(ge=-0.15, le=0.15), Doc("Metres of the camera ahead of the body's centre.")
+    ] = Camera().offset
+    camera_pitch: Annotated[
+        float, Interval(ge=-45, le=45), Doc("Degrees by which the camera looks up; walls stay upright.")
+    ] = Camera().pitch
+    look: Annotated[
+        str,
+        OneOf(*LOOKS),
+        Doc(
+            "plain: one colour and a flat light; varied: patterns, colours, light and signs of each maze's own (training "
+            "mazes have other patterns than the rest), and exposure and noise of each picture's."
+        ),
+    ] = PLAIN
     lidar_noise: Annotated[
         str | None,
         ReadBy(noise_text),
@@ -53,6 +76,16 @@ class SensorOptions(Options):
             "metres and the share of rays that are lost, at 5 m reach; that of the track, or exact, if not given."
         ),
     ] = None
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the sensors `egocentric`, `depth` and `labels`."""
+        return Camera(self.camera_size, self.camera_fov, self.camera_height, self.camera_offset, self.camera_pitch)
+
+    @property
+    def is_unseen(self) -> bool:
+        """True if mazes have patterns that training mazes don't have."""
+        return False
 
     @property
     def lidar(self) -> LidarModel:
@@ -70,10 +103,12 @@ class Worlds(NamedTuple):
     pose: np.ndarray  # [K, 3] float64, of the body: x, y (m), yaw (rad, not wrapped)
     marker: np.ndarray  # [K, 3] float64, m: where the goal marker stands
     noise: Sequence[np.random.Generator | None]  # [K], draws the lidar's noise in an episode; None: there is none
+    picture_noise: Sequence[np.random.Generator | None]  # [K], the same of pictures
+    num_threads: int = 1  # in which they may be read; 0 for all cores
 
 
 class Sensor(abc.ABC):
-    """A kind of sensor, opened for the mazes of one environment. It may serve several names, as the cameras do."""
+    """A kind of sensor, opened for the mazes of one environment. It may serve several names, as the camera does."""
 
     @classmethod
     @abc.abstractmethod
