@@ -14,7 +14,7 @@ from mazebench.options import options_in
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
 
-_DRAWN = ("map", "lidar")  # views that need no rendering
+_DRAWN = ("map", "lidar", "depth", "labels")  # views that need no rendering, and those of the sensors
 
 
 @takes_options(TaskOptions, EvalOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", "episodes_per_distance"])
@@ -25,15 +25,15 @@ def render(
     view: Annotated[
         str,
         typer.Option(
-            help="top, egocentric, chase, map (shown map and driven path), lidar (true maze and rays, with --sensors "
-            "lidar), or all of them side by side."
+            help="top, egocentric, chase, map (shown map and driven path), one of the --sensors (lidar: true maze and "
+            "rays; egocentric, depth and labels: what the agent saw), or all of them side by side."
         ),
     ] = "all",
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     options = EvalOptions(agent=agent, task=watched_task(values).options, **options_in(values, EvalOptions))
-    load_mujoco(renders=view not in _DRAWN)
+    load_mujoco(renders=view not in (*_DRAWN, *values.get("sensors", ())))
     from mazebench.play import film
 
     outcome = film.film_episode(options, out, view, pixels)

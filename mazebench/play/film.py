@@ -23,7 +23,8 @@ from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.sensors import LIDAR
+from mazebench.tasks.sensors import LIDAR, SENSORS
+from mazebench.tasks.sensors.cameras import as_colors
 from mazebench.tasks.shown_map import show_map
 from mazebench.world.models import models_of
 from mazebench.world.ray_casting import ray_ends
@@ -40,7 +41,8 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
     Args:
       options: who drives where, as for an evaluation.
       out: an .mp4 or .gif of the episode, or a .png of its last moment, with the whole path on the map.
-      view: a camera, "map", "lidar" where that is a sensor of the task, or "all" for all of them side by side.
+      view: a camera, "map", a sensor of the task, or "all" for all of them side by side; a camera that is a sensor
+        shows what the agent observed.
       pixels: side of a view.
 
     Returns:
@@ -50,8 +52,8 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
       InputError: if a name is unknown or `out` can't be written.
       RenderingError: if this machine can't render.
     """
-    if view not in (MAP, *CAMERAS, LIDAR, "all"):
-        raise unknown("view", view, (MAP, *CAMERAS, LIDAR, "all"))
+    if view not in (every := (MAP, *{**dict.fromkeys(CAMERAS), **SENSORS}, "all")):
+        raise unknown("view", view, every)
     if out.suffix not in _WRITERS:
         raise unknown("suffix", out.suffix, _WRITERS)
     out = out.absolute()  # agents may change the working folder
@@ -65,9 +67,9 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
 def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[list[np.ndarray], str]:
     """Runs the episode; returns a picture of each of its moments, or of the last one alone, and what came of it."""
     plan = make_plan(options)
-    if view == LIDAR and LIDAR not in plan.task.sensors:
-        raise InputError(f"view {LIDAR!r}: expected a task with this sensor; add --sensors {LIDAR}")
-    views = (MAP, *CAMERAS, *([LIDAR] if LIDAR in plan.task.sensors else [])) if view == "all" else (view,)
+    if view in SENSORS and view not in (*CAMERAS, *plan.task.sensors):
+        raise InputError(f"view {view!r}: expected a task with this sensor; add --sensors {view}")
+    views = (MAP, *dict.fromkeys((*CAMERAS, *plan.task.sensors))) if view == "all" else (view,)
     number = options.seed % len(plan.trials)
     trial = plan.trials[number]
     episode = trial.episode
@@ -116,10 +118,8 @@ class _Scene:
         self._task = self.envs.task
         self._path: list[np.ndarray] = []  # [2] m each
         self.record_position()
-        names = tuple(view for view in self.views if view in CAMERAS)
-        self._cameras = (
-            Cameras(models_of(self._task.mazes, self._task.options.textures), names, self.pixels) if names else None
-        )
+        names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.sensors)
+        self._cameras = Cameras(models_of(self._task.mazes), names, self.pixels) if names else None
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""
@@ -134,8 +134,14 @@ class _Scene:
         if self._cameras is not None:
             pictures = self._cameras.take(self.episode.maze, rules.pose[0], rules.marker[0])
         for view in set(self.views) - pictures.keys():
-            picture = self._map() if view == MAP else self._rays(observation[LIDAR][0])
-            pictures[view] = cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
+            if view == MAP:
+                picture = self._map()
+            elif view == LIDAR:
+                picture = self._rays(observation[LIDAR][0])
+            else:
+                picture = as_colors(view, observation[view][0])
+            way = cv2.INTER_NEAREST if len(picture) < self.pixels else cv2.INTER_AREA
+            pictures[view] = cv2.resize(picture, (self.pixels, self.pixels), interpolation=way)
         return np.concatenate([pictures[view] for view in self.views], axis=1)
 
     def close(self) -> None:

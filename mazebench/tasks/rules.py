@@ -247,8 +247,14 @@ class Rules:
                     add_error(state)
         observed = {"state": states.astype(np.float32)}
         if self.task.sensors:
-            noise = [[noise[i] for i in indices.tolist()] for noise in (self._lidar_noise, self._picture_noise)]
-            worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], *noise, self._num_threads)
+            worlds = Worlds(
+                self.maze[indices],
+                self.pose[indices],
+                self.marker[indices],
+                [self._lidar_noise[i] for i in indices.tolist()],
+                [self._picture_noise[i] for i in indices.tolist()],
+                self._num_threads,
+            )
             observed |= self._sensors.read(worlds)
         return observed
 

@@ -10,9 +10,11 @@ from __future__ import annotations
 import colorsys
 import functools
 import hashlib
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mazebench.maps.maze import Maze
 
@@ -60,8 +62,8 @@ class Camera(NamedTuple):
 class Look(NamedTuple):
     """The look of one maze, or of several, along a first axis."""
 
-    # [N, N] int8, rows from the bottom. Of a free cell, the surface of the walls that are seen from it; of a wall, -1, or
-    # minus the number of the sign's pattern.
+    # [N, N] int8, rows from the bottom. Of a free cell: the surface of the walls that are seen from it. Of a wall: -1,
+    # or minus the number of its sign's pattern.
     grid: np.ndarray
     patterns: np.ndarray  # [NUM_SURFACES + 1] int64, of the surfaces and the floor
     # [NUM_SURFACES + 3, 2, 3] float32, of the surfaces, floor, sky and signs: the colour where the mask is 0, and what
@@ -100,7 +102,7 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
         patterns=np.array([*rng.choice(_WALLS[is_unseen], NUM_SURFACES), rng.choice(_FLOORS[is_unseen])]),
         colors=_steps(pairs),
         light=_light(rng.uniform(0.4, 0.75), rng.uniform(0.1, 0.35), sun * np.cos(angle), sun * np.sin(angle)),
-        fading=np.float32(rng.uniform(0, 0.03)),
+        fading=np.array(rng.uniform(0, 0.03), dtype=np.float32),
     )
 
 
@@ -119,11 +121,12 @@ def _plain_look(maze: Maze) -> Look:
         patterns=np.array([_PLAIN_WALL] * NUM_SURFACES + [_PLAIN_FLOOR]),
         colors=_steps(pairs),
         light=_light(AMBIENT, HEADLIGHT, *SUN * towards_sun[:2]),
-        fading=np.float32(0),
+        fading=np.zeros((), dtype=np.float32),
     )
 
 
-def _steps(pairs: list) -> np.ndarray:
+def _steps(pairs: Sequence[ArrayLike]) -> np.ndarray:
+    """Returns `Look.colors` of pairs of colours where a mask is 0 and where it is 255, in [0, 1]."""
     low, high = 255 * np.array(pairs, dtype=np.float32).swapaxes(0, 1)
     return np.stack([low, (high - low) / 255], axis=1)
 

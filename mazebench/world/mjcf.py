@@ -16,6 +16,7 @@ from mazebench.constants import ACTIONS, MAX_PIXELS, PHYSICS_TIMESTEP, TOP_SPEED
 from mazebench.errors import InputError
 from mazebench.maps import colors
 from mazebench.maps.maze import WALL_HEIGHT, Maze
+from mazebench.world import looks
 
 BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
 BODY_HEIGHT = 0.56
@@ -34,7 +35,6 @@ CONTACT_MARGIN = 0.03
 # As stiff as the timestep allows, and overdamped: with a damping ratio of 1 up to 18 % of the speed rebounds.
 _CONTACT_SOLREF = [2 * PHYSICS_TIMESTEP, 3.0]
 _CONTACTS: dict[str, Any] = {"condim": 1, "margin": CONTACT_MARGIN, "solref": _CONTACT_SOLREF}  # of walls
-_EYE_HEIGHT = 0.45
 MAX_BOXES = 32_768  # of a whole model; the time that MuJoCo takes for them, 2 s, grows with the square
 _PARKED_DEPTH = 10.0  # metres below the floor
 
@@ -112,8 +112,8 @@ def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray, for_robot: bool
     offscreen = getattr(spec.visual, "global")  # a keyword of Python
     offscreen.offwidth = MAX_PIXELS
     offscreen.offheight = MAX_PIXELS
-    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
-    spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
+    spec.visual.headlight.ambient = [looks.AMBIENT] * 3
+    spec.visual.headlight.diffuse = [looks.HEADLIGHT] * 3
     spec.visual.headlight.specular = [0, 0, 0]
 
     _add_materials(spec, maze)
@@ -134,8 +134,8 @@ def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.62, 0.76, 0.90],
-        rgb2=[0.93, 0.96, 0.98],
+        rgb1=looks.SKY_COLOR,
+        rgb2=looks.HORIZON_COLOR,
         width=64,
         height=64,
     )
@@ -147,9 +147,9 @@ def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
         type=mujoco.mjtTexture.mjTEXTURE_2D,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
         mark=lines,
-        rgb1=[0.86, 0.84, 0.80],
-        rgb2=[0.86, 0.84, 0.80],
-        markrgb=[0.70, 0.68, 0.64],
+        rgb1=looks.FLOOR_COLOR,
+        rgb2=looks.FLOOR_COLOR,
+        markrgb=looks.LINE_COLOR,
         width=128,
         height=128,
     )
@@ -158,7 +158,7 @@ def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
     # With texuniform, a repetition of 1 spans two metres.
     repeat = 2 / maze.cell_size
     spec.add_material(name="floor", textures=textures, texrepeat=[repeat, repeat], texuniform=True)
-    spec.add_material(name="wall", rgba=[0.36, 0.47, 0.60, 1])
+    spec.add_material(name="wall", rgba=[*looks.WALL_COLOR, 1])
     spec.add_material(name="agent", rgba=[0.90, 0.45, 0.13, 1])
     spec.add_material(name="nose", rgba=[0.15, 0.15, 0.18, 1])
     spec.add_material(name="goal", rgba=[*colors.GOAL, 0.7], emission=0.1)
@@ -181,8 +181,8 @@ def _add_room(spec: mujoco.MjSpec, side: float, carries: bool) -> None:
         name="sun",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
         pos=[middle, middle, 2 * side],
-        dir=[0.3, 0.4, -1],
-        diffuse=[0.55, 0.55, 0.55],
+        dir=looks.SUN_DIRECTION,
+        diffuse=[looks.SUN] * 3,
         castshadow=False,  # its shadow map is too coarse for large mazes
     )
     # High and narrow, so that walls hardly lean outwards; about 1.04 * side at the walls' height fill the view.
@@ -251,9 +251,10 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
     )
     body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
 
-    eye = _EYE_HEIGHT - BODY_HEIGHT / 2
     # The camera looks along the body's x axis: its right is -y, its up is z. The nose is below its view.
-    body.add_camera(name="egocentric", pos=[0.12, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
+    camera = looks.Camera()
+    eye = [camera.offset, 0, camera.height - BODY_HEIGHT / 2]
+    body.add_camera(name="egocentric", pos=eye, xyaxes=[0, -1, 0, 0, 0, 1], fovy=camera.fov)
     # Between narrow walls, it is nearer and looks down more steeply.
     behind = min(1.0, maze.cell_size)
     body.add_camera(name="chase", pos=[-1.6 * behind, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66 * behind], fovy=60)

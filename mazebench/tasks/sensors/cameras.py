@@ -5,11 +5,20 @@ from __future__ import annotations
 import numpy as np
 from dm_env import specs
 
+from mazebench.maps.colors import GOAL, to_bytes
 from mazebench.maps.drawn import Mazes
 from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
 from mazebench.world.looks import EXPOSURES, LABELS, MAX_DEPTH, NUM_NOISE
 
 _NO_NOISE = -1
+_LABEL_COLORS = np.array([(170, 205, 235), (150, 145, 135), (60, 80, 105), to_bytes(GOAL)], dtype=np.uint8)
+
+
+def as_colors(name: str, picture: np.ndarray) -> np.ndarray:
+    """Returns what a sensor observed as `[H, H, 3]` uint8, for people: depths in grey, white at 10 m."""
+    if name == "labels":
+        return _LABEL_COLORS[picture]
+    return picture if name == "egocentric" else (picture[..., None] * ([255 / MAX_DEPTH] * 3)).astype(np.uint8)
 
 
 class CameraSensor(Sensor):

@@ -64,8 +64,8 @@ class SensorOptions(Options):
         str,
         OneOf(*LOOKS),
         Doc(
-            "plain: one colour and a flat light; varied: patterns, colours, light and signs of each maze's own (training "
-            "mazes have other patterns than the rest), and exposure and noise of each picture's."
+            "plain: flat colours; varied: patterns, colours, light and signs that are each maze's own (training mazes "
+            "have other patterns than the rest), with an exposure and noise that are each picture's own."
         ),
     ] = PLAIN
     lidar_noise: Annotated[
