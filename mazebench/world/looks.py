@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import ndimage
 
 from mazebench.maps.maze import Maze
 
@@ -33,6 +34,21 @@ NUM_NOISE = 2**18  # places in a table at which the noise of a picture may begin
 
 MAX_DEPTH = 10.0  # m; what is farther, and the sky, read it
 LABELS = ("sky", "floor", "wall", "goal")
+
+
+class Picture(NamedTuple):
+    """A kind of pictures."""
+
+    shape: tuple[int, ...]  # of a pixel
+    kind: type  # of its values
+    highest: float  # of them; 0 is the lowest
+
+
+PICTURES = {
+    "egocentric": Picture((3,), np.uint8, 255),  # red, green, blue
+    "depth": Picture((), np.float32, MAX_DEPTH),  # m along the view's axis, of a wide camera along a column's
+    "labels": Picture((), np.uint8, len(LABELS) - 1),  # indices of `LABELS`
+}
 
 TEXELS = 64  # a side of a pattern, which spans a metre of a wall, or a cell of the floor
 NUM_SURFACES = 4  # patterns on the walls of a maze
@@ -80,9 +96,7 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
         return _plain_look(maze)
     rng = rng_of(maze)
 
-    # Surfaces for square regions of the floor plan, and signs on some walls.
-    regions = rng.integers(NUM_SURFACES, size=(maze.size // _CELLS_PER_REGION + 1,) * 2)
-    surfaces = np.kron(regions, np.ones((_CELLS_PER_REGION,) * 2, dtype=int))[: maze.size, : maze.size]
+    surfaces = regions_of(maze, NUM_SURFACES, rng)
     signs = np.where(rng.random(maze.walls.shape) < _SIGN_SHARE, -rng.choice(_SIGNS, maze.walls.shape), -1)
 
     # Two colours for each of them, of any hue but the goal's.
@@ -109,6 +123,12 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
 def rng_of(maze: Maze) -> np.random.Generator:
     """Returns a generator of what is drawn from a hash of the walls."""
     return np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+
+
+def regions_of(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Returns a number below `count` for each cell, `[N, N]` int, the same in a square region of a few cells."""
+    regions = rng.integers(count, size=(maze.size // _CELLS_PER_REGION + 1,) * 2)
+    return np.kron(regions, np.ones((_CELLS_PER_REGION,) * 2, dtype=int))[: maze.size, : maze.size]
 
 
 def _plain_look(maze: Maze) -> Look:
@@ -148,14 +168,9 @@ def patterns() -> np.ndarray:
         return np.kron(rng.random((TEXELS // height, TEXELS // width)), np.ones((height, width)))
 
     def rough() -> np.ndarray:  # smooth noise of several wavelengths, from 0 to 1
-        total = np.zeros((TEXELS, TEXELS))
-        for cells in (2, 4, 8, 16, 32):
-            points, at = rng.random((cells, cells)), np.arange(TEXELS) * cells / TEXELS
-            low, share = at.astype(int), at % 1
-            for shift, weight in ((0, 1 - share), (1, share)):
-                rows = points[(low + shift) % cells] * weight[:, None]
-                total += (rows[:, low] * (1 - share) + rows[:, (low + 1) % cells] * share) / cells
-        return (total - total.min()) / np.ptp(total)
+        waves = [rng.random((cells, cells)) / cells for cells in (2, 4, 8, 16, 32)]
+        total = sum(ndimage.zoom(w, TEXELS // len(w), order=1, mode="grid-wrap", grid_mode=True) for w in waves)
+        return (total - np.min(total)) / np.ptp(total)
 
     shifted = (x + 16 * (y // 8 % 2)) % 32  # every second row of bricks
     stones = rng.random((24, 2, 1, 1)) * TEXELS

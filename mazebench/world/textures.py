@@ -1,8 +1,7 @@
 """The textured look of a maze: walls, floor and sky that tell places apart, by MuJoCo's own textures alone.
 
-Cells near each other form a region, and the walls seen from a region have one of a few surfaces. Regions and surfaces
-are drawn from a hash of the walls. So equal mazes look equal, and in a maze that was never seen a surface says nothing
-about the place on the map.
+The walls seen from a region have one of a few surfaces, which is drawn from a hash of the walls. So equal mazes look
+equal, and in a maze that was never seen a surface says nothing about the place on the map.
 """
 
 from __future__ import annotations
@@ -12,12 +11,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.sparse import csgraph
 
 from mazebench.maps.maze import WALL_HEIGHT, Maze
-from mazebench.world.looks import rng_of
+from mazebench.world.looks import regions_of, rng_of
 
-_CELLS_PER_REGION = 7
 _OFFSET = 0.002  # m, from a wall to its face
 
 _Colour = tuple[float, float, float]
@@ -104,32 +101,8 @@ def wall_faces(maze: Maze) -> list[Face]:
 
 
 def _surfaces(maze: Maze) -> np.ndarray:
-    """Returns the surface of the walls that are seen from each free cell, -1 in walls: `[N, N]` int.
-
-    Regions next to each other have different surfaces if that can be, and all surfaces are used about equally often.
-    """
-    rng = rng_of(maze)
-
-    # Regions: the cells nearest to each of some sites.
-    num_cells, graph = len(maze.free_cells), maze.graph
-    sites = np.sort(rng.choice(num_cells, max(1, num_cells // _CELLS_PER_REGION), replace=False))
-    _, _, nearest = csgraph.dijkstra(graph, unweighted=True, indices=sites, min_only=True, return_predecessors=True)
-    region = np.searchsorted(sites, nearest)  # of each free cell
-
-    # A surface for each region: of those that no neighbour has, one that was used least.
-    borders = region[np.stack(graph.nonzero())]  # [2, E]
-    surface = np.full(len(sites), -1)  # of each region
-    uses = np.zeros(len(_SURFACES))
-    for site in range(len(sites)):
-        around = surface[borders[1, borders[0] == site]]
-        is_around = np.isin(np.arange(len(_SURFACES)), around)
-        rank = np.where(is_around, np.inf, uses)
-        surface[site] = rng.choice(np.flatnonzero(rank == rank.min()))
-        uses[surface[site]] += 1
-
-    result = np.full(maze.walls.shape, -1)
-    result[~maze.walls] = surface[region]
-    return result
+    """Returns the surface of the walls that are seen from each free cell, -1 in walls: `[N, N]` int."""
+    return np.where(maze.walls, -1, regions_of(maze, len(_SURFACES), rng_of(maze)))
 
 
 def add_textures(spec: mujoco.MjSpec, maze: Maze) -> None:

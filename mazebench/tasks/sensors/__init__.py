@@ -5,11 +5,10 @@ from __future__ import annotations
 from mazebench.tasks.sensors.cameras import CameraSensor
 from mazebench.tasks.sensors.lidar import LidarSensor
 from mazebench.tasks.sensors.sensor import Sensor
+from mazebench.world.looks import PICTURES
 
 LIDAR = "lidar"  # the sensor that every track offers
 SENSORS: dict[str, type[Sensor]] = {
-    "egocentric": CameraSensor,
-    "depth": CameraSensor,
-    "labels": CameraSensor,
+    **dict.fromkeys(PICTURES, CameraSensor),
     LIDAR: LidarSensor,
 }

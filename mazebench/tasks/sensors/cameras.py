@@ -8,9 +8,8 @@ from dm_env import specs
 from mazebench.maps.colors import GOAL, to_bytes
 from mazebench.maps.drawn import Mazes
 from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
-from mazebench.world.looks import EXPOSURES, LABELS, MAX_DEPTH, NUM_NOISE
+from mazebench.world.looks import EXPOSURES, MAX_DEPTH, NUM_NOISE, PICTURES
 
-_NO_NOISE = -1
 _LABEL_COLORS = np.array([(170, 205, 235), (150, 145, 135), (60, 80, 105), to_bytes(GOAL)], dtype=np.uint8)
 
 
@@ -26,12 +25,8 @@ class CameraSensor(Sensor):
 
     @classmethod
     def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
-        shape = (options.camera_size, options.camera_size)
-        if name == "egocentric":
-            return specs.BoundedArray((*shape, 3), np.uint8, 0, 255, name)
-        if name == "depth":
-            return specs.BoundedArray(shape, np.float32, 0.0, MAX_DEPTH, name)
-        return specs.BoundedArray(shape, np.uint8, 0, len(LABELS) - 1, name)
+        shape, kind, highest = PICTURES[name]
+        return specs.BoundedArray((options.camera_size, options.camera_size, *shape), kind, 0, highest, name)
 
     def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: Mazes):
         # Imported here: who only reads a task's options, such as the command line, shall not load numba.
@@ -41,17 +36,14 @@ class CameraSensor(Sensor):
         self._camera = RayCamera(mazes, options.camera, options.look, options.is_unseen)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
-        """Returns `[K, H, H, 3]` uint8, `[K, H, H]` float32 (m) or `[K, H, H]` uint8 by name."""
-        exposure = np.ones(len(worlds.pose), dtype=np.float32)
-        noise = np.full(len(worlds.pose), _NO_NOISE)
-        if "egocentric" in self._names:
-            darkest, brightest = np.log(EXPOSURES)
-            for i, rng in enumerate(worlds.picture_noise):
-                if rng is not None:
-                    exposure[i] = np.exp(rng.uniform(darkest, brightest))
-                    noise[i] = rng.integers(NUM_NOISE)
+        """Returns `[K, H, H, ...]` by name, as in `PICTURES`."""
+        count, (darkest, brightest) = len(worlds.pose), np.log(EXPOSURES)
+        gain, noise_at = np.ones(count, dtype=np.float32), np.full(count, -1)
+        for i, rng in enumerate(worlds.picture_noise):
+            if rng is not None:
+                gain[i], noise_at[i] = np.exp(rng.uniform(darkest, brightest)), rng.integers(NUM_NOISE)
         return self._camera.take(
-            self._names, worlds.maze, worlds.pose, worlds.marker, exposure, noise, worlds.num_threads
+            self._names, worlds.maze, worlds.pose, worlds.marker, gain, noise_at, worlds.num_threads
         )
 
     def close(self) -> None:

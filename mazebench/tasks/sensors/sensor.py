@@ -18,6 +18,7 @@ from mazebench.options import Doc, OneOf, Options, ReadBy
 from mazebench.world.looks import LOOKS, PLAIN, Camera
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
+_CAMERA = Camera()
 CAMERA_OPTIONS = ("camera_size", "camera_fov", "camera_height", "camera_offset", "camera_pitch", "look")
 _NAMED = {"turtlebot3": TURTLEBOT3}
 
@@ -45,21 +46,17 @@ def noise_text(text: object) -> str | None:
 class SensorOptions(Options):
     """The options that sensors read."""
 
-    camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a picture.")] = Camera().size
+    camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a picture.")] = _CAMERA.size
     camera_fov: Annotated[
-        float,
-        Interval(ge=10, le=360),
-        Doc("Degrees from the left to the right of a picture; above 120, its columns are at equal angles."),
-    ] = Camera().fov
-    camera_height: Annotated[float, Interval(ge=0.1, le=0.9), Doc("Metres of the camera above the floor.")] = (
-        Camera().height
+        float, Interval(ge=10, le=360), Doc("Degrees that a picture is wide; above 120, columns are at equal angles.")
+    ] = _CAMERA.fov
+    camera_height: Annotated[float, Interval(ge=0.1, le=0.9), Doc("Metres above the floor.")] = _CAMERA.height
+    camera_offset: Annotated[float, Interval(ge=-0.15, le=0.15), Doc("Metres ahead of the body's centre.")] = (
+        _CAMERA.offset
     )
-    camera_offset: Annotated[
-        float, Interval(ge=-0.15, le=0.15), Doc("Metres of the camera ahead of the body's centre.")
-    ] = Camera().offset
     camera_pitch: Annotated[
-        float, Interval(ge=-45, le=45), Doc("Degrees by which the camera looks up; walls stay upright.")
-    ] = Camera().pitch
+        float, Interval(ge=-45, le=45), Doc("Degrees that the camera looks up; walls stay upright.")
+    ] = _CAMERA.pitch
     look: Annotated[
         str,
         OneOf(*LOOKS),
