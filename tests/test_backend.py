@@ -11,11 +11,12 @@ MISSING = [name for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")) if n
 WRONG = ["elg", *MISSING[:1]]
 NO_RENDERING = (
     "generate --size 5 --format txt,mjcf",
-    "eval --agent planner --split train --distances 1 --episodes-per-distance 1",
+    "eval --agent planner --split train --distances 1 --episodes-per-distance 1 --sensors egocentric",
+    "render --view egocentric --sensors egocentric --out seen.png",
     "render --view map --out map.png",
     "list",
 )
-RENDERING = ("render --out x.png", "eval --agent planner --sensors egocentric")
+RENDERING = ("render --out x.png", "render --out x.png --view egocentric")
 COMMANDS = """
 import sys, mazebench.cli
 for words in {lines}:

@@ -76,7 +76,6 @@ def test_the_navigator_plays_without_map_and_goal():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"hide": ("map",), "sensors": ("top",)}, "hide map: expected sensors without 'top', which shows the maze"),
         ({"hide": ("map", "goal"), "sensors": ("egocentric",)}, "without 'egocentric', which shows where the goal is"),
         ({"hide": ("map", "map")}, "expected each hide once, found map, map"),
         (

@@ -178,11 +178,6 @@ class TestOptions:
             ("building", {"pairs": "fixed"}, "track 'building': expected pairs 'random', found 'fixed'"),
             ("building", {"map_warp": 0.1}, "track 'building': expected map_warp 0.0, found 0.1"),
             (
-                "adrift",
-                {"sensors": ("chase",)},
-                "'adrift': expected sensors without 'chase', which shows where the body",
-            ),
-            (
                 "building",
                 {"mazes": CORRIDOR},
                 "corridor: expected distances of at most 6 m, as far as the maze reaches, found 40; choose others",

@@ -1,11 +1,10 @@
-"""The textured look: a matter of pictures alone, which depends on the walls alone."""
+"""The textured models that `generate` writes, whose look depends on the walls alone."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 import pytest
-from processes import run_with_egl
 
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
@@ -67,30 +66,3 @@ class TestMjcf:
             _, up, outwards = rotation.reshape(3, 3).T
             np.testing.assert_allclose(outwards, (*facing(expected), 0), atol=1e-9)
             np.testing.assert_allclose(up, (0, 0, 1), atol=1e-9)
-
-
-class TestPictures:
-    def test_only_pictures_change(self):
-        run_with_egl("""
-options = dict(size=13, seed=3, sensors="egocentric")
-plain, textured = mazebench.load("local", **options), mazebench.load("local", **options, textures=True)
-one, other = plain.reset().observation, textured.reset().observation
-for action in (0, 4, 0, 0, 5, 2):
-    for name in one:
-        assert np.array_equal(one[name], other[name]) == (name != "egocentric")
-    one, other = plain.step(action).observation, textured.step(action).observation
-""")
-
-    def test_the_goal_is_seen_in_red_from_four_cells_away(self):
-        run_with_egl("""
-from mazebench.maps.text import parse_maze
-from mazebench.world.models import models_of
-from mazebench.world.rendering import Cameras
-maze = parse_maze("########\\n#......#\\n########\\n########\\n########\\n########\\n########\\n########", "corridor")
-red = []
-for textures in (False, True):
-    cameras = Cameras(models_of((maze,), textures), ("egocentric",), 64, smooth=False)
-    picture = cameras.take(0, np.array([1.5, 6.5, 0.0]), np.array([5.5, 6.5, 0.0]))["egocentric"].astype(int)
-    red.append(int(((picture[..., 0] > 150) & (picture[..., 1:] < 90).all(axis=-1)).sum()))
-assert red[1] >= 12 > red[0], red
-""")
