@@ -5,6 +5,7 @@ A ratio is the median over rounds, so that a machine whose speed drifts slows bo
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -19,8 +20,10 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.kinds import generate
 from mazebench.tasks.task import TRAIN_DISTANCES, Task
+from mazebench.world.looks import LOOKS, PICTURES, PLAIN, Camera
 from mazebench.world.mjcf import action_controls
 from mazebench.world.near_walls import near_walls_of
+from mazebench.world.ray_camera import RayCamera
 from mazebench.world.simulation import MujocoSimulation
 
 NUM_ENVS = (1, 16, 256, 1024, 4096)
@@ -43,6 +46,8 @@ def run(quick: bool) -> dict[str, Any]:
         "mujoco": mujoco.__version__,
         "environments": measure(environments(), seconds, rounds),
         "256 environments by size": measure(sizes(), seconds, rounds),
+        "64 environments of building 2 with pictures": measure(with_pictures(), seconds, rounds),
+        "pictures alone, each of which counts as a step": measure(pictures(), seconds, rounds),
     }
 
 
@@ -66,6 +71,34 @@ def sizes(chosen: Sequence[int] = SIZES, num_envs: int = 256) -> list[Side]:
     for size in chosen:
         mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(8)]
         sides.append(_vector(f"{size} x {size}", Task.of(mazes=mazes, distances=TRAIN_DISTANCES), num_envs))
+    return sides
+
+
+def with_pictures(num_envs: int = 64) -> list[Side]:
+    """Returns vector environments on a track without and with pictures of 64 pixels a side."""
+    observed = {"no picture": {}, **{look: {"sensors": "egocentric", "look": look} for look in LOOKS}}
+    observed["plain, with depth and labels"] = {"sensors": (*PICTURES,)}
+    return [_vector(name, Task.of("building", level=2, **options), num_envs) for name, options in observed.items()]
+
+
+def pictures(
+    sizes: Sequence[int] = (13, 31, 101, 255), pixels: Sequence[int] = (84, 128), count: int = 64
+) -> list[Side]:
+    """Returns one thread that draws pictures in mazes of several sizes, and in the first one at several sizes."""
+    sides = []
+    for size, side, look in [
+        *((size, 64, look) for look in LOOKS for size in sizes),
+        *((sizes[0], each, PLAIN) for each in pixels),
+    ]:
+        rng = np.random.default_rng(size)
+        maze = generate("dfs", size, rng)
+        points = maze.point(maze.free_cells[rng.integers(len(maze.free_cells), size=count)])
+        pose = np.column_stack([points, rng.uniform(-np.pi, np.pi, count)])
+        noise_at = np.full(count, -1 if look == PLAIN else 0)
+        scene = np.zeros(count, dtype=np.int64), pose, pose[::-1], np.ones(count, dtype=np.float32), noise_at
+        camera = RayCamera((maze,), Camera(side), look)
+        take = functools.partial(camera.take, ("egocentric",), *scene)
+        sides.append(Side(f"{look}, {side} pixels, {size} x {size}", lambda _, take=take: take(), count))
     return sides
 
 

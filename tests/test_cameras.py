@@ -242,7 +242,7 @@ class TestLooks:
         assert not np.array_equal(looks[0].colors, looks[2].colors)
 
     def test_pictures_are_the_golden_ones(self):
-        golden = cv2.imread(str(GOLDEN)).astype(int)
+        golden = cv2.imread(str(GOLDEN))[..., ::-1].astype(int)
         assert np.abs(golden_pictures() - golden).max() <= 1
 
 
@@ -303,4 +303,4 @@ def test_a_process_ends_quietly_when_nobody_closes_the_renderer(program):
 
 
 if __name__ == "__main__":
-    cv2.imwrite(str(GOLDEN), golden_pictures())
+    cv2.imwrite(str(GOLDEN), golden_pictures()[..., ::-1])
