@@ -141,11 +141,7 @@ class TestScripts:
 
     def test_pixels(self, tmp_path):
         needs("torch")
-        probe = "import mujoco; mujoco.GLContext(64, 64).free()"
-        egl = {"MUJOCO_GL": "egl"}
-        if run_python("-c", probe, status=None, variables=egl).returncode:
-            pytest.skip("EGL is not usable here")
-        run_python(EXAMPLES / "pixels.py", "--steps", "2", "--out", "seen.png", cwd=tmp_path, variables=egl)
+        run_python(EXAMPLES / "pixels.py", "--steps", "2", "--out", "seen.png", cwd=tmp_path)
         assert cv2.imread(str(tmp_path / "seen.png")).shape == (2 * 84, 4 * 84, 3)
 
     def test_own_maze(self, script, command, tmp_path):

@@ -1,4 +1,4 @@
-"""Tables of docs/options.md and docs/environments; `python tests/test_option_tables.py` rewrites them from the code.
+"""Tables of docs/options.md, sensors.md and environments; `python tests/test_option_tables.py` rewrites them from the code.
 
 A page chooses the rows of a table by their first cells. The other cells follow from the code.
 """
@@ -17,7 +17,7 @@ from mazebench.tasks.task_options import HIERARCHICAL, LOCAL, TaskOptions
 from mazebench.tasks.tracks import TRACKS
 
 DOCS = pathlib.Path(__file__).parent.parent / "docs"
-PAGES = [DOCS / "options.md", *sorted((DOCS / "environments").glob("[!i]*.md"))]
+PAGES = [DOCS / "options.md", DOCS / "sensors.md", *sorted((DOCS / "environments").glob("[!i]*.md"))]
 OPTIONS = fields_of(TaskOptions)
 TABLE = re.compile(r"\| (?:option \| default \| (?:values|meaning)|level) \|.*\n\|[-|]+\n(?:\|.*\n)+")
 ROW = re.compile(r"^\| `?(\w+)`? \|.*", re.M)

@@ -1,6 +1,6 @@
-"""Observes through cameras: a policy on pictures in many environments, and what they saw as a picture.
+"""Observes through a camera: a policy on pictures in many environments, and what they saw as a picture.
 
-MUJOCO_GL=egl python docs/examples/pixels.py --out pixels.png
+python docs/examples/pixels.py --out pixels.png
 """
 
 import argparse
@@ -18,7 +18,7 @@ parser.add_argument("--steps", type=int, default=10)
 parser.add_argument("--out", default="pixels.png")
 arguments = parser.parse_args()
 
-envs = mazebench.make_vec("local", arguments.num_envs, size=13, sensors=["egocentric", "top"], camera_size=84)
+envs = mazebench.make_vec("local", arguments.num_envs, size=13, sensors=["egocentric", "depth"], look="varied", camera_size=84)
 policy = nn.Sequential(
     nn.Conv2d(3, 16, 8, stride=4), nn.ReLU(), nn.Conv2d(16, 32, 4, stride=2), nn.ReLU(), nn.Flatten(), nn.LazyLinear(6)
 )
@@ -28,7 +28,8 @@ for _ in range(arguments.steps):
     with torch.no_grad():
         actions = torch.distributions.Categorical(logits=policy(pictures)).sample().numpy()
     observations, rewards, terminated, truncated, infos = envs.step(actions)
-rows = [np.concatenate(list(observations[camera]), axis=1) for camera in ("egocentric", "top")]
+depths = np.repeat(observations["depth"][..., None] * 25.5, 3, axis=-1).astype(np.uint8)  # white at 10 m
+rows = [np.concatenate(list(pictures), axis=1) for pictures in (observations["egocentric"], depths)]
 cv2.imwrite(arguments.out, cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
-print(f"{arguments.out}: what {arguments.num_envs} environments saw last: the top row through the agent's eyes")
+print(f"{arguments.out}: what {arguments.num_envs} environments saw last: colours, and how far away things are")
 envs.close()

@@ -24,6 +24,7 @@ from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task_options import DRAWN_KINDS, ENDS, HIERARCHICAL, LOCAL, NUM_DRAWN, TaskOptions
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import DISTANCES, LEVELS, MAX_CELL_SIZE, TRACKS, cells_of, distance_of
+from mazebench.world.looks import PICTURES
 
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
@@ -186,7 +187,7 @@ class Task:
             cell_size=self.cell_size,
             hidden=self.options.hide,
             lidar=self.options.lidar if LIDAR in self.sensors else None,
-            camera=self.options.camera if {*self.sensors} - {LIDAR} else None,
+            camera=self.options.camera if PICTURES.keys() & {*self.sensors} else None,
             odometry_noise=max(map(self.odometry_noise_at, self.levels or LEVELS[:1])),
         )
 

@@ -34,6 +34,7 @@ from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipSha
 from mazebench.tasks.sensors import LIDAR, SENSORS
 from mazebench.tasks.sensors.sensor import CAMERA_OPTIONS, SensorOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.looks import PICTURES
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
 LOCAL, HIERARCHICAL = "local", "hierarchical"
@@ -509,7 +510,7 @@ class TaskOptions(SensorOptions, ReadOptions):
         if self.is_hierarchical:
             raise InputError(f"{hidden}: expected the task 'local' or a track, found {self.task!r}")
         self._require(hidden, num_goals=1)
-        cameras = [name for name in self.sensors if name != LIDAR]
+        cameras = [name for name in self.sensors if name in PICTURES]
         if cameras and "goal" in self.hide:
             raise InputError(f"{hidden}: expected sensors without {cameras[0]!r}, which shows where the goal is")
 
