@@ -5,7 +5,6 @@ A ratio is the median over rounds, so that a machine whose speed drifts slows bo
 
 from __future__ import annotations
 
-import functools
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -20,7 +19,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.kinds import generate
 from mazebench.tasks.task import TRAIN_DISTANCES, Task
-from mazebench.world.looks import LOOKS, PICTURES, PLAIN, Camera
+from mazebench.world.looks import LOOKS, PICTURES, PLAIN, VARIED, Camera
 from mazebench.world.mjcf import action_controls
 from mazebench.world.near_walls import near_walls_of
 from mazebench.world.ray_camera import RayCamera
@@ -76,30 +75,16 @@ def sizes(chosen: Sequence[int] = SIZES, num_envs: int = 256) -> list[Side]:
 
 def with_pictures(num_envs: int = 64) -> list[Side]:
     """Returns vector environments on a track without and with pictures of 64 pixels a side."""
-    observed = {"no picture": {}, **{look: {"sensors": "egocentric", "look": look} for look in LOOKS}}
+    observed: dict[str, dict[str, Any]] = {"no picture": {}}
+    observed |= {look: {"sensors": "egocentric", "look": look} for look in LOOKS}
     observed["plain, with depth and labels"] = {"sensors": (*PICTURES,)}
     return [_vector(name, Task.of("building", level=2, **options), num_envs) for name, options in observed.items()]
 
 
-def pictures(
-    sizes: Sequence[int] = (13, 31, 101, 255), pixels: Sequence[int] = (84, 128), count: int = 64
-) -> list[Side]:
-    """Returns one thread that draws pictures in mazes of several sizes, and in the first one at several sizes."""
-    sides = []
-    for size, side, look in [
-        *((size, 64, look) for look in LOOKS for size in sizes),
-        *((sizes[0], each, PLAIN) for each in pixels),
-    ]:
-        rng = np.random.default_rng(size)
-        maze = generate("dfs", size, rng)
-        points = maze.point(maze.free_cells[rng.integers(len(maze.free_cells), size=count)])
-        pose = np.column_stack([points, rng.uniform(-np.pi, np.pi, count)])
-        noise_at = np.full(count, -1 if look == PLAIN else 0)
-        scene = np.zeros(count, dtype=np.int64), pose, pose[::-1], np.ones(count, dtype=np.float32), noise_at
-        camera = RayCamera((maze,), Camera(side), look)
-        take = functools.partial(camera.take, ("egocentric",), *scene)
-        sides.append(Side(f"{look}, {side} pixels, {size} x {size}", lambda _, take=take: take(), count))
-    return sides
+def pictures(chosen: Sequence[int] = (13, 31, 101, 255), pixels: Sequence[int] = (84, 128)) -> list[Side]:
+    """Returns cameras that take pictures of 64 pixels in mazes of several sizes, and of more in the first one."""
+    sides = [_camera(look, size, 64) for look in LOOKS for size in chosen]
+    return sides + [_camera(PLAIN, chosen[0], each) for each in pixels]
 
 
 def measure(sides: Sequence[Side], seconds: float, rounds: int) -> list[dict[str, Any]]:
@@ -161,3 +146,17 @@ def _vector(name: str, task: Task, num_envs: int, num_threads: int = 0) -> Side:
     envs = MazeVectorEnv(task, num_envs, seed=0, num_threads=num_threads)
     envs.reset()
     return Side(name, envs.step, num_envs)
+
+
+def _camera(look: str, size: int, pixels: int, count: int = 64) -> Side:
+    rng = np.random.default_rng(size)
+    maze = generate("dfs", size, rng)
+    points = maze.point(maze.free_cells[rng.integers(len(maze.free_cells), size=count)])
+    pose, marker = np.column_stack([points, rng.uniform(-np.pi, np.pi, count)]), np.zeros((count, 3))
+    gain, noise_at = np.ones(count, dtype=np.float32), np.full(count, 0 if look == VARIED else -1)
+    camera = RayCamera((maze,), Camera(pixels), look)
+
+    def take(actions: np.ndarray) -> None:
+        camera.take(("egocentric",), np.zeros(count, dtype=np.int64), pose, marker, gain, noise_at)
+
+    return Side(f"{look}, {pixels} pixels, {size} x {size}", take, count)

@@ -20,5 +20,5 @@ def test_mazes_of_several_sizes_are_measured():
 
 
 def test_pictures_are_measured_in_environments_and_alone():
-    rows = measure([*with_pictures(num_envs=2), *pictures((5,), (8,), count=2)], seconds=0.01, rounds=1)
+    rows = measure([*with_pictures(num_envs=2), *pictures((5,), (8,))], seconds=0.01, rounds=1)
     assert {"no picture", "varied", "plain, 8 pixels, 5 x 5"} <= {row["name"] for row in rows}

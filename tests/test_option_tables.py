@@ -1,4 +1,4 @@
-"""Tables of docs/options.md, sensors.md and environments; `python tests/test_option_tables.py` rewrites them from the code.
+"""Tables of options in docs; `python tests/test_option_tables.py` rewrites them from the code.
 
 A page chooses the rows of a table by their first cells. The other cells follow from the code.
 """

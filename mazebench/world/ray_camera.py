@@ -246,7 +246,7 @@ class RayCamera:
           threads: that draw; 0 for all cores.
         """
         count, slots = len(pose), self._slots(maze)
-        pictures = tuple(
+        pictures: tuple[np.ndarray, ...] = tuple(
             np.empty((count * (name in names), self._camera.size, self._camera.size, *picture.shape), picture.kind)
             for name, picture in looks.PICTURES.items()
         )
