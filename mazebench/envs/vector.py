@@ -293,7 +293,10 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Takes over what the agents of the environments `indices` observe; each call draws new noise."""
         states = states_from_sensors(self._sensordata[indices])
         for name, values in self.rules.observe(states, indices).items():
-            self._observed[name][indices] = values
+            if len(indices) == self.num_envs:
+                self._observed[name] = values  # pictures are large, so they are not copied
+            else:
+                self._observed[name][indices] = values
 
     def _observations(self) -> dict[str, np.ndarray]:
         return {name: values.copy() for name, values in self._observed.items()}
