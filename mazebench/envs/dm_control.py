@@ -194,9 +194,6 @@ class Environment(control.Environment):
         self.task.set_state(state, self.physics)
         self._reset_next_step = state.needs_reset
 
-    def close(self) -> None:
-        self.task.close()
-
     def reward_spec(self) -> specs.Array:
         if self.maze_task.options.reward == PROGRESS:
             return specs.Array((), float, name="reward")

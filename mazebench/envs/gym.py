@@ -112,7 +112,6 @@ class MazeEnv(JsonSpec, gymnasium.Env):
     def close(self) -> None:
         if self._cameras is not None:
             self._cameras.close()
-        self.runner.close()
 
     def get_state(self) -> EnvironmentState:
         """Returns this moment of the environment, to go back to with `set_state` as often as you like."""

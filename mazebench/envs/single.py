@@ -152,10 +152,6 @@ class TaskRunner:
         self.rng.bit_generator.state = state.rng
         vars(self.rules).update(_copied(state.rules))
 
-    def close(self) -> None:
-        """Closes the sensors."""
-        self.rules.close()
-
 
 class EnvironmentState(NamedTuple):
     """A moment of an environment. Its content is the environment's own matter; it can be pickled."""

@@ -325,7 +325,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 
     def close_extras(self, **kwargs: Any) -> None:
-        self.rules.close()
         if self._top_camera is not None:
             self._top_camera.close()
         del self._batch, self._geoms  # with the views of its arrays, which ends the threads

@@ -55,8 +55,3 @@ class OpenSensors:
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds."""
         return {name: values for sensor in self._sensors for name, values in sensor.read(worlds).items()}
-
-    def close(self) -> None:
-        """Closes all sensors."""
-        for sensor in self._sensors:
-            sensor.close()

@@ -306,7 +306,3 @@ class Rules:
             "track": self.track[i],
             "level": self.level.item(i),
         }
-
-    def close(self) -> None:
-        """Closes the sensors."""
-        self._sensors.close()

@@ -34,20 +34,11 @@ NUM_NOISE = 2**18  # places in a table at which the noise of a picture may begin
 
 MAX_DEPTH = 10.0  # m; what is farther, and the sky, read it
 LABELS = ("sky", "floor", "wall", "goal")
-
-
-class Picture(NamedTuple):
-    """A kind of pictures."""
-
-    shape: tuple[int, ...]  # of a pixel
-    kind: type  # of its values
-    highest: float  # of them; 0 is the lowest
-
-
-PICTURES = {
-    "egocentric": Picture((3,), np.uint8, 255),  # red, green, blue
-    "depth": Picture((), np.float32, MAX_DEPTH),  # m along the view's axis, of a wide camera along a column's
-    "labels": Picture((), np.uint8, len(LABELS) - 1),  # indices of `LABELS`
+# The kinds of pictures: the shape and the type of a pixel, and its largest value.
+PICTURES: dict[str, tuple[tuple[int, ...], type, float]] = {
+    "egocentric": ((3,), np.uint8, 255),  # red, green, blue
+    "depth": ((), np.float32, MAX_DEPTH),  # m along the view's axis, of a wide camera along a column's
+    "labels": ((), np.uint8, len(LABELS) - 1),  # indices of `LABELS`
 }
 
 TEXELS = 64  # a side of a pattern, which spans a metre of a wall, or a cell of the floor

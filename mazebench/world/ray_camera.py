@@ -219,7 +219,7 @@ class RayCamera:
         self._camera, self._lens = camera, lens_of(camera, mazes[0].cell_size)
         self._slot_of = {0: 0}  # where the look of a maze is among `_looks`
         self._looks = Look(*(values[None] for values in self._draw_look(0)))
-        self._threads: ThreadPoolExecutor | None = None
+        self._threads: ThreadPoolExecutor | None = None  # which end with it
 
     def _draw_look(self, maze: int) -> Look:
         return looks.look_of(self._mazes[maze], self._look, self._is_unseen)
@@ -247,8 +247,8 @@ class RayCamera:
         """
         count, slots = len(pose), self._slots(maze)
         pictures: tuple[np.ndarray, ...] = tuple(
-            np.empty((count * (name in names), self._camera.size, self._camera.size, *picture.shape), picture.kind)
-            for name, picture in looks.PICTURES.items()
+            np.empty((count * (name in names), self._camera.size, self._camera.size, *shape), kind)
+            for name, (shape, kind, _) in looks.PICTURES.items()
         )
         scene = (self._camera, self._lens, self._looks, self._mazes[0].cell_size, slots, pose, marker)
 
@@ -277,9 +277,3 @@ class RayCamera:
             for kept, values in zip(self._looks, self._draw_look(number), strict=True):
                 kept[slot] = values
         return np.array([self._slot_of[number] for number in numbers])
-
-    def close(self) -> None:
-        """Ends the threads; the next pictures start others."""
-        if self._threads is not None:
-            self._threads.shutdown()
-            self._threads = None

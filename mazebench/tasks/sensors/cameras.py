@@ -45,6 +45,3 @@ class CameraSensor(Sensor):
         return self._camera.take(
             self._names, worlds.maze, worlds.pose, worlds.marker, gain, noise_at, worlds.num_threads
         )
-
-    def close(self) -> None:
-        self._camera.close()

@@ -119,6 +119,3 @@ class Sensor(abc.ABC):
     @abc.abstractmethod
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by name: one observation, as in `observation_spec`, for each of K >= 1 worlds."""
-
-    def close(self) -> None:  # noqa: B027 - most sensors hold nothing open
-        """Releases what the sensor holds; the next `read` opens it again."""
