@@ -15,14 +15,14 @@ from mazebench.tasks.tracks import LEVELS, TRACKS
 # Each line's place is its colour and marker, in all figures.
 _LOOKS = (
     "navigator", "neural-planner", "navigator without map", "planner-closed-loop", "mmn", "mah", "mah-paper", "dqn",
-    "random", "navigator with the true pose", "mmn without model and search", "sb3_agent:PPOAgent", "open path",
+    "random", "navigator with the true pose", "mmn without model and search", "sb3_agent:FieldPPOAgent", "open path",
     "blocked path",
 )  # fmt: skip
 # What lines are called where they end; others by their label.
 _NAMES = {
     "navigator without map": "without the map",
     "navigator with the true pose": "with the true pose",
-    "sb3_agent:PPOAgent": "PPO, untuned",
+    "sb3_agent:FieldPPOAgent": "PPO",
     "mmn without model and search": "mmn, no model and search",
 }
 
@@ -70,7 +70,7 @@ def budget(kept: Kept) -> Drawn:
     panels = []
     for track in TRACKS:
         points = []
-        for agent in ("navigator", "navigator without map", "sb3_agent:PPOAgent", "neural-planner"):
+        for agent in ("navigator", "navigator without map", "sb3_agent:FieldPPOAgent", "neural-planner"):
             own = kept.of(agent, f"{track}-2")
             limit = own.oracle_steps.astype(float).fillna(np.inf)
             for factor in np.arange(1.0, 3.01, 0.125):
