@@ -62,7 +62,7 @@ class DistanceField:
             self._fields[slot] = distances.reshape(side, side)[1:-1, 1:-1]
 
     def features(self, observation: Mapping[str, np.ndarray], slots: np.ndarray | None = None) -> np.ndarray:
-        """Returns features `[B, P^2 + 7 + R]` of what all environments, or those of `slots`, observe."""
+        """Returns features `[B, P^2 + 8 + R]` of what all environments, or those of `slots`, observe."""
         state = observation["state"].astype(np.float64)
         fields = np.stack(self._fields if slots is None else [self._fields[slot] for slot in slots])
         x, y = state[:, X, None] / self._pixel, state[:, Y, None] / self._pixel

@@ -96,6 +96,15 @@ def _paint(picture, j, begin, end, pattern, side, across, up, fall, tones, lit):
         height -= step
 
 
+@inlined
+def _add_noise(picture, place, noise):  # type: ignore[no-untyped-def]
+    """Adds noise from a place in the table to a picture; each row begins at a place of its own."""
+    for i in range(len(picture)):
+        line, first = picture[i].reshape(-1), (place + _ROW_OF_NOISE * i) % NUM_NOISE
+        for k in range(len(line)):
+            line[k] = min(max(np.int16(line[k]) + noise[first + k], 0), 255)
+
+
 @kernel
 def _draw(begin, end, camera, lens, look, cell, slots, pose, marker, masks, disc, gain, noise_at, noise, pictures):  # type: ignore[no-untyped-def]
     """Draws the pictures from `begin` to `end`; those of length 0 are not drawn."""
@@ -197,10 +206,7 @@ def _draw(begin, end, camera, lens, look, cell, slots, pose, marker, masks, disc
                     picture[i, j, k] = np.uint8(_DISC_OPACITY * tone + (1 - _DISC_OPACITY) * picture[i, j, k])
 
         if len(rgb) and noise_at[b] >= 0:
-            for i in range(size):
-                line, first = rgb[b, i].reshape(-1), (noise_at[b] + _ROW_OF_NOISE * i) % NUM_NOISE
-                for k in range(len(line)):
-                    line[k] = min(max(np.int16(line[k]) + noise[first + k], 0), 255)
+            _add_noise(rgb[b], noise_at[b], noise)
 
 
 @functools.cache

@@ -6,14 +6,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mazebench.kernels import compiled
-
-if TYPE_CHECKING:
-    from mazebench.world.ray_casting import LidarModel
 
 _PARALLEL = 1e-300  # the least component of a ray, so that the lines it is parallel to are far away but not at infinity
 
@@ -86,16 +82,19 @@ def cast(
 
 
 @compiled
-def measure(ranges: np.ndarray, normal: np.ndarray, uniform: np.ndarray, model: LidarModel) -> np.ndarray:
-    """Returns what a lidar of a model reads of true distances (`[K, R]` float32, m): `[K, R]` float32, m.
+def measure(
+    ranges: np.ndarray, normal: np.ndarray, uniform: np.ndarray, min_range: float, max_range: float, sigma: float,
+    step: float, lost: float,
+) -> np.ndarray:  # fmt: skip
+    """Returns what a lidar reads of true distances (`[K, R]` float32, m): `[K, R]` float32, m.
 
-    `normal` and `uniform` (`[K, R]` float64) are random numbers.
+    `normal` and `uniform` (`[K, R]` float64) are random numbers. The others are the fields of a `LidarModel`, in order.
     """
     readings = np.empty(ranges.shape, dtype=np.float32)
     for ray in np.ndindex(ranges.shape):
-        reading = float(ranges[ray]) + model.sigma * float(normal[ray])
-        if model.step:
-            reading = model.step * round(reading / model.step)
-        is_lost = ranges[ray] >= np.float32(model.max_range) or uniform[ray] < model.lost
-        readings[ray] = model.max_range if is_lost else min(max(reading, model.min_range), model.max_range)
+        reading = float(ranges[ray]) + sigma * float(normal[ray])
+        if step:
+            reading = step * round(reading / step)
+        is_lost = ranges[ray] >= np.float32(max_range) or uniform[ray] < lost
+        readings[ray] = max_range if is_lost else min(max(reading, min_range), max_range)
     return readings

@@ -1,4 +1,4 @@
-"""What the agent's camera sees of the true world, the goal's disc in it, as observations."""
+"""The agent's camera as a sensor: colours, depths and labels of the true world with the goal's disc in it."""
 
 from __future__ import annotations
 

@@ -55,4 +55,4 @@ def read(ranges: np.ndarray, model: LidarModel, rngs: Sequence[np.random.Generat
         else:
             rng.standard_normal(out=normal[i])
             rng.random(out=uniform[i])
-    return measure(ranges, normal, uniform, model)
+    return measure(ranges, normal, uniform, *model)
