@@ -118,8 +118,7 @@ class _Processes:
 
     def _broken(self) -> InputError | RunError:
         """Returns the error of workers that ended abruptly."""
-        for process in self._processes:
-            process.join(PATIENCE)
+        self._executor.shutdown()  # whose thread waits for the workers: a second one could be told no exit status
         if any(process.exitcode == _NO_GUARD for process in self._processes):
             return InputError(
                 "expected the call with workers under `if __name__ == '__main__':`, since each worker runs the script "
