@@ -66,4 +66,3 @@ class MapPolicy(PlanReader):
         return np.array([cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in pictures], np.uint8).reshape(
             -1, *size, 3
         )
-

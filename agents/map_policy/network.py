@@ -1,7 +1,7 @@
 """The network of the map policy: gated convolutions over the map, read around the body, beside the picture.
 
-`G` is the number of maps, `L` of cells on a side of each, `K` of states, `P` of points around the body, `C` of channels.
-Lengths are in cells.
+`G` is the number of maps, `L` of cells on a side of each, `K` of states, `P` of points around the body, `C` of
+channels. Lengths are in cells.
 """
 
 from __future__ import annotations
@@ -77,9 +77,7 @@ class MapNetwork(nn.Module):
         """Returns what a learner logs of a reading, by name: nothing."""
         return {}
 
-    def forward(
-        self, reading: Reading, grid: torch.Tensor, situation: Situation
-    ) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(self, reading: Reading, grid: torch.Tensor, situation: Situation) -> tuple[torch.Tensor, torch.Tensor]:
         """Returns logits `[K, 6]` and values `[K]` of states on the maps `grid` (`[K]` int) of a reading."""
         num_cells = reading.features.shape[1]
         corners, weights = around(situation.pose, _POINTS, math.isqrt(num_cells))

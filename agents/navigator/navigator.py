@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface, Report
 from mazebench.maps.maze import cell_to_point
 
-from ..robot.body import LOOK_LEFT, PLAYED, WITHOUT_STRAFING, as_kind
+from ..robot.body import LOOK_LEFT, LOOK_RIGHT, PLAYED, TURN_STEP, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
+from ..robot.facing import as_if_turned, driven_while_turning, turn_along
 from ..robot.pilot import steer
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, report
@@ -25,6 +26,7 @@ class _Robot:
     """The robot in one environment: what it knows, and the drive that is under way."""
 
     memory: Memory
+    heading: float  # rad, with which it plans its drives where it turns as it drives
     drive: Drive = dataclasses.field(default_factory=Drive)
 
 
@@ -32,10 +34,12 @@ class Navigator(Agent):
     """Localizes itself, maps the walls that it senses, plans over walls and goal, and drives, all at each step."""
 
     plays_actions = PLAYED
+    senses_class: ClassVar[type[Senses]] = Senses
 
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""
-        self._senses, self._cell_size = Senses(interface, "navigator"), interface.cell_size
+        self._senses, self._cell_size = self.senses_class(interface, "navigator"), interface.cell_size
+        self._turns = interface.actions == "velocity" and self._senses.is_narrow
         self._kind, self._strafes = interface.actions, interface.actions not in WITHOUT_STRAFING
 
     @classmethod
@@ -57,14 +61,16 @@ class Navigator(Agent):
     ) -> tuple[np.ndarray, list[_Robot | None]]:
         """Returns actions `[B]`, for one environment after the other."""
         actions = np.zeros(len(state), dtype=np.int64)
+        velocities = np.zeros((len(state), 3))
+        inputs = self._senses.look(inputs)
         for slot, robot in enumerate(state):
             if inputs.active is None or inputs.active[slot]:
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
-                    robot = state[slot] = _Robot(memory)
+                    robot = state[slot] = _Robot(memory, memory.body.yaw)
 
                 # A path over walls and goal as they are estimated now.
-                body = memory.body
+                body = as_if_turned(memory.body, robot.heading) if self._turns else memory.body
                 walls, goal = self.estimate(memory, inputs, slot)
                 path = plan(walls, goal, memory.cell, self._cell_size) if goal.any() else []
 
@@ -76,9 +82,15 @@ class Navigator(Agent):
                     blocked = walls > _BLOCKED
                     blocked[tuple(np.transpose(path))] = False
                     action, point = robot.drive.next(blocked, path, body, self._cell_size, self._strafes)
-                memory.command(action, point)
+                if self._turns:
+                    turn = turn_along(path, memory.body, len(walls))
+                    velocities[slot] = driven_while_turning(memory.body, robot.heading, action, turn)
+                    memory.command(action, point, robot.heading, turn)
+                    robot.heading += TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
+                else:
+                    memory.command(action, point)
                 actions[slot] = action
-        return as_kind(self._kind, actions), state
+        return velocities if self._turns else as_kind(self._kind, actions), state
 
     def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns what it plans on, `[L, L]` float twice: the probability of a wall, and weights of the goal."""

@@ -142,7 +142,7 @@ class CostPlanner(nn.Module):
 def around(pose: torch.Tensor, points: torch.Tensor, size: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Returns the four cells `[4, K, P]` int around points, as row * L + column, and their weights, which sum to 1.
 
-    The points `[P, 2]` lie ahead of bodies and to their left, whose poses are `[K, 3]`, on grids of `size` cells a side.
+    The points `[P, 2]` lie ahead of bodies and to their left. The poses `[K, 3]` are on grids of `size` cells a side.
     """
     cosine, sine = torch.cos(pose[:, 2:]), torch.sin(pose[:, 2:])
     ahead, left = points.to(pose.device).T

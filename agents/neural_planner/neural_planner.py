@@ -46,6 +46,10 @@ class NeuralPlanner(PlanReader):
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
         return report(robot.memory if robot else None for robot in state.robots)
 
+    def look(self, inputs: Inputs) -> Inputs:
+        """Returns inputs with ranges, which a robot without a lidar reads from its pictures."""
+        return self._senses.look(inputs)
+
     def observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
         """Returns the memory after an observation."""
         return self._senses.observe(memory, inputs, slot)

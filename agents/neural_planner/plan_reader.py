@@ -58,6 +58,10 @@ class PlanReader(NetworkAgent):
         """Returns one goal an episode."""
         return {"num_goals": 1}
 
+    def look(self, inputs: Inputs) -> Inputs:
+        """Returns inputs with what is sensed in all environments at once."""
+        return inputs
+
     def observe(self, memory: Any, inputs: Inputs, slot: int) -> Any:
         """Returns what is known of the episode in environment `slot` after an observation."""
         raise NotImplementedError
@@ -90,7 +94,7 @@ class PlanReader(NetworkAgent):
         """Returns actions `[B]`, drawn by the policy's probabilities at a low temperature."""
         # What the robots observe; they plan in their first step of a leg, and every few steps after it.
         slots = list(range(len(state.robots))) if inputs.active is None else np.flatnonzero(inputs.active).tolist()
-        robots = []
+        inputs, robots = self.look(inputs), []
         for slot in slots:
             robot = state.robots[slot]
             if robot is None or inputs.new_episode[slot]:

@@ -43,6 +43,7 @@ class Beams(NamedTuple):
     lost: float  # probability that a ray reads `reach` though it meets a wall
     random: float  # probability of any reading
     metre: float = 1.0  # cells per metre
+    growth: float = 0.0  # of the standard deviation, per square of a range
 
 
 def beams_of(model: LidarModel, cells_per_metre: float) -> Beams:
@@ -60,7 +61,7 @@ def _hit_likelihood(reading: float, distance: float, across: float, deviation: f
     that graze.
     """
     off_pose = deviation / max(across, _GRAZING)
-    sigma = math.sqrt(beams.sigma**2 + off_pose**2)
+    sigma = math.sqrt(beams.sigma**2 + (beams.growth * distance * distance) ** 2 + off_pose**2)
     off = (reading - distance) / sigma
     if reading >= beams.reach:
         return beams.lost + (1 - beams.lost) * (0.0 if off > _WIDE else 0.5 * math.erfc(off * math.sqrt(0.5)))
@@ -94,14 +95,14 @@ def log_likelihoods(
 def log_likelihood(
     walls: np.ndarray, x: float, y: float, yaw: float, ranges: np.ndarray, beams: Beams, deviation: float
 ) -> float:
-    """Returns the log likelihood of a scan from one pose."""
+    """Returns the log likelihood of a scan from one pose; rays that read NaN tell nothing."""
     total, size, num_rays = 0.0, len(walls), len(ranges)
     turn_cosine, turn_sine = math.cos(2 * math.pi / num_rays), math.sin(2 * math.pi / num_rays)
     along_x, along_y = math.cos(yaw), math.sin(yaw)
     for i in range(num_rays):
         reading, passed, likelihood = ranges[i], 1.0, 0.0
         ray = rays.ray_from(x, y, along_x, along_y)
-        while True:
+        while not math.isnan(reading):
             distance = rays.leaves_at(ray)
             across = abs(along_x) if rays.leaves_sideways(ray) else abs(along_y)
             ray = rays.in_next_cell(ray)
@@ -114,7 +115,8 @@ def log_likelihood(
             wall = walls[size - 1 - ray.level, ray.column]
             likelihood += passed * wall * _hit_likelihood(reading, distance, across, deviation, beams)
             passed *= 1 - wall
-        total += math.log(likelihood)
+        if not math.isnan(reading):
+            total += math.log(likelihood)
         along_x, along_y = along_x * turn_cosine - along_y * turn_sine, along_y * turn_cosine + along_x * turn_sine
     return total
 
@@ -136,6 +138,8 @@ def add_scan(
     margin, behind = _MARGIN * beams.metre + 2 * deviation, _BEHIND * beams.metre
     for i in range(len(ranges)):
         angle, reading = yaw + 2 * math.pi * i / len(ranges), ranges[i]
+        if math.isnan(reading):
+            continue
         along_x, along_y = math.cos(angle), math.sin(angle)
 
         # The cells that the ray enters, and how likely the reading is if it ends there.

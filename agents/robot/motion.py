@@ -17,7 +17,7 @@ REACH = 0.18  # m from the body's centre at which walls begin to push: its radiu
 _NO_WALLS = np.zeros((3, 3), dtype=bool)
 _DAMPING, _GAIN, _MAX_FORCE = 8.0, 60.0, 34.0
 _DRIVE_SPEED = TOP_SPEED * (1 + _DAMPING / _GAIN)
-_BEARINGS = np.array([0.0, math.pi, math.pi / 2, -math.pi / 2])  # of the four drives, from the heading
+BEARINGS = np.array([0.0, math.pi, math.pi / 2, -math.pi / 2])  # of the four drives, from the heading
 # Of a contact, computed from its time constant of 2 timesteps and its damping ratio of 3, as MuJoCo's documentation
 # of solref has it, for an impedance of 0.95.
 _IMPEDANCE = 0.95
@@ -33,8 +33,8 @@ def moved(
 
     `yaw` (rad) is the heading of a drive; a look action lets the body coast.
     """
-    drives = action < len(_BEARINGS)
-    bearing = yaw + _BEARINGS[action] if drives else 0.0
+    drives = action < len(BEARINGS)
+    bearing = yaw + BEARINGS[action] if drives else 0.0
     along_x, along_y = math.cos(bearing), math.sin(bearing)
     for _ in range(STEPS_PER_ACTION):
         force, gain = 0.0, 0.0

@@ -1,7 +1,7 @@
 """The senses of a robot: it localizes itself, maps the walls that it senses, and finds out how the shown map lies.
 
-It senses walls by its lidar, or by touch where there is none. It measures lengths in cells. `L` is the number of cells
-on a side of its grid: the maze where the position is known, else a grid around the start.
+It senses walls by its lidar, by its camera and touch, or by touch alone. It measures lengths in cells. `L` is the
+number of cells on a side of its grid: the maze where the position is known, else a grid around the start.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from .body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, Point, observed_body
 from .cells import marked_cell, nearest_cell
 from .contacts import felt_walls
 from .dead_reckoning import DeadReckoning
+from .facing import as_if_turned
 from .map_matching import MapBelief
 from .map_reading import read_map
 from .occupancy import SURE, posterior, seen_walls
@@ -33,6 +34,7 @@ _MARK_OFF = 1.0  # m, standard deviation of the goal from its marker, once it wa
 _EXACT, _TRACKED, _RECKONED = 0.01, 0.03, 0.15  # that is observed, tracked by a lidar, or reckoned from noisy ones
 _VISITED = 4.0  # log odds that a cell is free in which the body was
 _GAIN = 0.03  # weight of a noisy position against the one that velocities tell
+_ALL_ROUND = 270.0  # degrees of a view, from which turning shows nothing new
 _ROUNDING = 1e-4  # of positions as float32
 
 
@@ -52,6 +54,7 @@ class Memory:
     searched: np.ndarray = dataclasses.field(init=False)  # [L, L] bool, cells without the goal: the body was in them
     commanded: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # the pose after the last action
     action: int = LOOK_LEFT  # the last one
+    heading: float | None = None  # rad, with which the last action drives; None for the body's
 
     def __post_init__(self) -> None:
         self.prior, self.goal = self.belief.mixture()
@@ -82,10 +85,14 @@ class Memory:
             goal = ndimage.gaussian_filter(self.goal, _MARK_OFF / self.cell_size, mode="constant") * is_possible
         return np.where(is_closed, 1.0, walls), goal
 
-    def command(self, action: int, point: Point) -> None:
-        """Remembers the action that follows, and the point (x, y) that it should bring the body to."""
-        turn = TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
-        self.commanded, self.action = np.array([*point, self.body.yaw + turn]), action
+    def command(self, action: int, point: Point, heading: float | None = None, turn: float | None = None) -> None:
+        """Remembers the action that follows, and the point (x, y) that it should bring the body to.
+
+        With a `heading` of its own, it drives as a body with this heading would, and turns by `turn` looks to the left.
+        """
+        looks = (action == LOOK_LEFT) - (action == LOOK_RIGHT) if turn is None else turn
+        self.commanded, self.action = np.array([*point, self.body.yaw + TURN_STEP * looks]), action
+        self.heading = heading
 
 
 def report(memories: Iterable[Memory | None]) -> Report:
@@ -94,7 +101,7 @@ def report(memories: Iterable[Memory | None]) -> Report:
 
 
 class Senses:
-    """The senses of a robot in the environments of one interface, with their lidar if they have one."""
+    """The senses of a robot in the environments of one interface, with their lidar or camera if they have one."""
 
     def __init__(self, interface: Interface, agent: str):
         """Raises `UnplayableError`, in the name of `agent`, if maps are shown with less than a pixel per cell."""
@@ -102,14 +109,28 @@ class Senses:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
         self._odometry_noise = interface.odometry_noise
-        self._has_lidar = "lidar" in interface.sensors
-        self._beams = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size)
+        self._beams, self._camera = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size), None
+        self._has_ranges = "lidar" in interface.sensors
+        self.feels, self.is_narrow = not self._has_ranges, False  # whether it also feels walls, and sees ahead only
+        if interface.camera is not None and not self._has_ranges and "egocentric" in interface.sensors:
+            from .camera_ranges import CameraRanges  # which needs PyTorch
+
+            self._camera, self._has_ranges = CameraRanges(interface.camera, agent), True
+            self._beams = self._camera.beams(1 / self._cell_size)
+            self.is_narrow = interface.camera.fov < _ALL_ROUND
+
+    def look(self, inputs: Inputs) -> Inputs:
+        """Returns inputs in which robots without a lidar have ranges from their pictures in its place."""
+        if self._camera is None:
+            return inputs
+        ranges = self._camera.read(inputs.observation["egocentric"], inputs.active)
+        return inputs._replace(observation=inputs.observation | {"lidar": ranges})
 
     def observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
         """Returns the memory after an observation in environment `slot`; a new one where an episode begins."""
         observed = observed_body(inputs.observation["state"][slot].tolist(), 1 / self._cell_size)
         context, ranges = inputs.observation["context"][slot], None
-        if self._has_lidar:
+        if self._has_ranges:
             metres = inputs.observation["lidar"][slot].astype(np.float64)
             ranges = np.minimum(metres / self._cell_size, self._beams.reach)
 
@@ -184,8 +205,10 @@ class Senses:
             memory.tracker.update(walls, _pose(body), memory.commanded, ranges, self._beams)
             body = memory.tracker.body(observed)
         memory.body = body
-        if ranges is None:
+        if self.feels:
             off, size = memory.deviation, len(memory.searched)
+            if memory.heading is not None:
+                before = as_if_turned(before, memory.heading)
             for cell, log_odds in felt_walls(before, memory.action, body, self._cell_size, off, size):
                 memory.evidence[cell] = min(memory.evidence[cell] + log_odds, MOST_EVIDENCE)
 

@@ -50,8 +50,8 @@ _SIGN_SHARE = 0.15  # of the wall cells
 _NUM_SIGNS = 32
 # Where the patterns are among `patterns()`: those that training mazes have, and those that dev and eval mazes have.
 _PLAIN_WALL, _PLAIN_FLOOR = 0, 1
-_WALLS = {False: range(2, 10), True: range(10, 14)}  # by whether they are unseen in training
-_FLOORS = {False: range(14, 17), True: range(17, 19)}
+WALLS = {False: range(2, 10), True: range(10, 14)}  # by whether they are unseen in training
+FLOORS = {False: range(14, 17), True: range(17, 19)}
 _SIGNS = range(19, 19 + _NUM_SIGNS)
 
 
@@ -104,7 +104,7 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
     angle, sun = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.6)
     return Look(
         grid=np.where(maze.walls, signs, surfaces)[::-1].astype(np.int8),
-        patterns=np.array([*rng.choice(_WALLS[is_unseen], NUM_SURFACES), rng.choice(_FLOORS[is_unseen])]),
+        patterns=np.array([*rng.choice(WALLS[is_unseen], NUM_SURFACES), rng.choice(FLOORS[is_unseen])]),
         colors=_steps(pairs),
         light=_light(rng.uniform(0.4, 0.75), rng.uniform(0.1, 0.35), sun * np.cos(angle), sun * np.sin(angle)),
         fading=np.array(rng.uniform(0, 0.03), dtype=np.float32),
@@ -196,8 +196,11 @@ def patterns() -> np.ndarray:
     drawings = np.pad(np.concatenate([halves, halves[..., 1::-1]], axis=2), ((0, 0), (1, 1), (1, 1)))
     signs = [np.pad(np.kron(drawing, np.ones((9, 9)))[:62, :62], 1, constant_values=1) for drawing in drawings]
     plain_lines = 0.5 * ((x % 63 == 0) | (y % 63 == 0))  # half of a texel on each side of a cell's border
-    masks = np.stack([np.zeros_like(plain_lines), plain_lines, *walls, *floors, *signs]).clip(0, 1) * 255
+    return flattened(np.stack([np.zeros_like(plain_lines), plain_lines, *walls, *floors, *signs]).clip(0, 1) * 255)
 
+
+def flattened(masks: np.ndarray) -> np.ndarray:
+    """Returns masks `[P, 64, 64]` from 0 to 255 as `patterns` does, `[P, T]` uint8."""
     levels = [masks]
     while masks.shape[1] > 1:
         masks = (masks[:, ::2, ::2] + masks[:, 1::2, ::2] + masks[:, ::2, 1::2] + masks[:, 1::2, 1::2]) / 4

@@ -225,6 +225,7 @@ class RayCamera:
         self._camera, self._lens = camera, lens_of(camera, mazes[0].cell_size)
         self._slot_of = {0: 0}  # where the look of a maze is among `_looks`
         self._looks = Look(*(values[None] for values in self._draw_look(0)))
+        self.masks = looks.patterns()  # for a learner that draws others
         self._threads: ThreadPoolExecutor | None = None  # which end with it
 
     def _draw_look(self, maze: int) -> Look:
@@ -259,7 +260,7 @@ class RayCamera:
         scene = (self._camera, self._lens, self._looks, self._mazes[0].cell_size, slots, pose, marker)
 
         def draw(begin: int, end: int) -> None:
-            _draw(begin, end, *scene, looks.patterns(), _DISC_COLOR, gain, noise_at, _noise(), pictures)
+            _draw(begin, end, *scene, self.masks, _DISC_COLOR, gain, noise_at, _noise(), pictures)
 
         parts = min(threads or num_threads(), count // _FEWEST_PER_THREAD)
         if parts > 1:
