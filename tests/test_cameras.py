@@ -123,6 +123,14 @@ class TestOptions:
         assert MazeVectorEnv(task, 2).observation_space["labels"] == gymnasium.spaces.Box(0, 3, (2, 32, 32), np.uint8)
         assert task.interface.camera == Camera(32)
 
+    @pytest.mark.parametrize("named", ["", "egocentric", "depth,lidar"])
+    def test_sensors_that_are_named_replace_the_lidar_of_a_track(self, named):
+        options = {"sensors": named, "camera_size": 8} if named else {}
+        expected = {"state", "context", *(named or "lidar").split(",")}
+        assert set(mazebench.make("rebuilt", **options).reset(seed=0)[0]) == expected
+        assert set(mazebench.load("rebuilt", **options).reset(seed=0).observation) == expected
+        assert set(mazebench.make_vec(("building", "adrift"), 2, **options).reset(seed=0)[0]) == expected
+
     @pytest.mark.parametrize(
         ("options", "message"),
         [
