@@ -29,7 +29,7 @@ from mazebench.world.looks import VARIED
 
 _DEFAULT_RUN = RunOptions()
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
-_CAMERA = {"sensors": ("egocentric",), "camera_size": 64, "camera_fov": 75.0, "look": VARIED}
+_CAMERA: dict[str, Any] = {"sensors": ("egocentric",), "camera_size": 64, "camera_fov": 75.0, "look": VARIED}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
