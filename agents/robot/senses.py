@@ -97,12 +97,17 @@ class Senses:
     """The senses of a robot in the environments of one interface, with their lidar if they have one."""
 
     def __init__(self, interface: Interface, agent: str):
-        """Raises `UnplayableError`, in the name of `agent`, if maps are shown with less than a pixel per cell."""
+        """Raises `UnplayableError`, in the name of `agent`, if maps have less than a pixel per cell.
+
+        It raises it also if there are sensors without a lidar.
+        """
         if interface.context_size < interface.size:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
         self._odometry_noise = interface.odometry_noise
         self._has_lidar = "lidar" in interface.sensors
+        if interface.sensors:
+            interface.require_sensor("lidar", agent)
         self._beams = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size)
 
     def observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
