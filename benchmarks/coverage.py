@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 from scipy import special
@@ -20,35 +20,24 @@ _RATES_OF_RUNS = (0.1, 0.3, 0.5, 0.8, 0.95)
 _OF_MAZES, _OF_EPISODES = 0.7, 0.7  # standard deviations of log odds
 
 
-def beta_binomial(rate: float, correlation: float) -> Callable[..., np.ndarray]:
-    """Returns a draw of successes `[E]` in mazes with some episodes each.
-
-    Two episodes of one maze have the given correlation.
-    """
-
-    def draw(rng: np.random.Generator, mazes: int, size: int) -> np.ndarray:
-        rates = np.full(mazes, rate)
-        if correlation and rate < 1:
-            strength = 1 / correlation - 1
-            rates = rng.beta(rate * strength, (1 - rate) * strength, mazes)
-        return (rng.random(mazes * size) < rates.repeat(size)).astype(float)
-
-    return draw
+def beta_binomial(rng: np.random.Generator, rate: float, correlation: float, mazes: int, size: int) -> np.ndarray:
+    """Returns successes `[E]` in mazes with `size` episodes each, two of which have the given correlation."""
+    rates = np.full(mazes, rate)
+    if correlation and rate < 1:
+        strength = 1 / correlation - 1
+        rates = rng.beta(rate * strength, (1 - rate) * strength, mazes)
+    return (rng.random(mazes * size) < rates.repeat(size)).astype(float)
 
 
-def logistic(rate: float, of_runs: float) -> Callable[..., np.ndarray]:
-    """Returns a draw of successes `[R + 1, E]`, whose log odds vary by mazes, episodes and runs.
+def logistic(rng: np.random.Generator, rate: float, of_runs: float, mazes: int, size: int, runs: int) -> np.ndarray:
+    """Returns successes `[R + 1, E]`, whose log odds vary by mazes, episodes and runs.
 
     The last row is of another agent in the same episodes, which is not trained.
     """
-
-    def draw(rng: np.random.Generator, mazes: int, size: int, runs: int) -> np.ndarray:
-        odds = special.logit(rate) + (_OF_MAZES * rng.standard_normal(mazes)).repeat(size)
-        odds = odds + _OF_EPISODES * rng.standard_normal(mazes * size)
-        odds = odds + np.append(of_runs * rng.standard_normal(runs), 0.0)[:, None]
-        return (rng.random(odds.shape) < special.expit(odds)).astype(float)
-
-    return draw
+    odds = special.logit(rate) + (_OF_MAZES * rng.standard_normal(mazes)).repeat(size)
+    odds = odds + _OF_EPISODES * rng.standard_normal(mazes * size)
+    odds = odds + np.append(of_runs * rng.standard_normal(runs), 0.0)[:, None]
+    return (rng.random(odds.shape) < special.expit(odds)).astype(float)
 
 
 def mean_rate(rate: float, of_runs: float) -> float:
@@ -68,8 +57,8 @@ def single_run(mazes: int, size: int, correlation: float, count: int) -> list[st
     numbers, rng = np.arange(mazes).repeat(size), np.random.default_rng(0)
     cells = []
     for rate in _RATES:
-        draw = beta_binomial(rate, correlation)
-        cells.append(coverage((mean_interval(draw(rng, mazes, size), numbers) for _ in range(count)), rate))
+        draws = (beta_binomial(rng, rate, correlation, mazes, size) for _ in range(count))
+        cells.append(coverage((mean_interval(draw, numbers) for draw in draws), rate))
     return [f"{mazes} x {size}", f"{correlation:g}", *cells]
 
 
@@ -78,9 +67,9 @@ def several_runs(runs: int, of_runs: float, paired: bool, count: int) -> list[st
     numbers, rng = np.arange(48).repeat(5), np.random.default_rng(0)
     cells = []
     for rate in _RATES_OF_RUNS:
-        draw, truth, estimates = logistic(rate, of_runs), mean_rate(rate, of_runs), []
+        truth, estimates = mean_rate(rate, of_runs), []
         for _ in range(count):
-            *own, other = draw(rng, 48, 5, runs)
+            *own, other = logistic(rng, rate, of_runs, 48, 5, runs)
             estimates.append(runs_interval(np.array(own), numbers, *[other[None]] * paired))
         cells.append(coverage(estimates, truth - paired * mean_rate(rate, 0.0)))
     return [str(runs), f"{of_runs:g}", *cells]

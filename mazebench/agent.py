@@ -65,7 +65,7 @@ class _Declarations:
     """Declarations that the class of an agent may make; each has a default."""
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
-    needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them to the sensors that it is given
+    needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them, unless sensors are named
     # The kinds of actions that it can answer with: "six", "four", "velocity", "diff"; without "six", it is given the
     # first one.
     plays_actions: ClassVar[tuple[str, ...]] = ("six",)

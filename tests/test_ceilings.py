@@ -80,5 +80,5 @@ class TestCoverage:
     @pytest.mark.parametrize("of_runs", [0.0, 1.0])
     def test_mean_of_the_simulated_successes(self, of_runs):
         assert mean_rate(0.5, of_runs) == pytest.approx(0.5)
-        drawn = [logistic(0.9, of_runs)(np.random.default_rng(seed), 50, 1, 100)[:-1].mean() for seed in range(40)]
+        drawn = [logistic(np.random.default_rng(seed), 0.9, of_runs, 50, 1, 100)[:-1].mean() for seed in range(40)]
         assert np.mean(drawn) == pytest.approx(mean_rate(0.9, of_runs), abs=0.02)

@@ -164,6 +164,14 @@ class TestAgents:
         evaluate(Witness, out=tmp_path / "given", sensors=("lidar",), **FEW)
         assert results_of(tmp_path / "declared") == results_of(tmp_path / "given")
 
+    @pytest.mark.parametrize("agent", [Witness, "navigator", "neural-planner"])
+    def test_an_agent_without_the_sensor_that_it_needs_is_refused(self, agent, monkeypatch):
+        monkeypatch.setattr(Witness, "needs_sensors", ("lidar",))
+        with pytest.raises(
+            UnplayableError, match="expected the sensor lidar, found egocentric; add it: --sensors lidar"
+        ):
+            evaluate(agent, "building", sensors="egocentric")
+
 
 class TestSeeds:
     def test_agents_draw_otherwise_with_another_seed(self, random_run, tmp_path):

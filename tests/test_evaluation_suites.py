@@ -63,6 +63,17 @@ class TestParts:
         assert (paper["warp-0.1"].distances, paper["warp-0.1"].options.map_warp) == ((2, 4, 6, 8, 10), 0.1)
         assert (paper["noise-1.0"].distances, paper["noise-1.0"].options.position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
+    @pytest.mark.parametrize("split", ["", "-dev"])
+    def test_tracks_by_camera_alone_are_the_tracks_with_pictures_in_place_of_the_lidar(self, split):
+        for part, by_camera in zip(SUITES[f"tracks{split}"], SUITES[f"tracks-camera{split}"], strict=True):
+            task = resolve_for_evaluation(by_camera.task)
+            assert (task.sensors, task.options.look, task.options.camera[:2]) == (("egocentric",), "varied", (64, 75))
+            assert task.options.is_unseen
+            assert (by_camera.name, task.replace(sensors=(), look="plain")) == (
+                part.name,
+                resolve_for_evaluation(part.task),
+            )
+
 
 class TestRun:
     def test_the_folder_tells_what_is_in_it(self, tiny_run):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import datetime
 import os
 import pathlib
+import shutil
 
 import pytest
-from made_results import edit_records, edit_summary, make_result, read_summary
+from made_results import edit_records, edit_summary, edit_task, make_result, read_summary
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import TRACKS_BENCHMARK
@@ -52,7 +53,7 @@ def make_entry(agent, success=1.0, on_time=0.5, checkpoints=()):
 
 def rows(entries):
     """The cells of each line of the first table."""
-    first, _, _ = make_tables(entries).partition("\n\n")
+    _, first, *_ = make_tables(entries).split("\n\n")
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in first.splitlines()[2:]]
 
 
@@ -114,6 +115,23 @@ class TestPage:
             write_leaderboard([entry.model_copy(update=changes)], page)
         assert sorted(kept.success for kept in kept_entries(page)) == [0.25, entry.success]
         assert page.read_text() == f"before\n{BEGIN}{make_tables(kept_entries(page))}{END}after\n"
+
+    def test_results_by_camera_alone_are_in_a_division_of_their_own(self, suite, page, tmp_path):
+        shutil.copytree(suite, tmp_path / "by-camera")
+        for path in (tmp_path / "by-camera").glob("x/*"):
+            edit_task(path, sensors=["egocentric"], look="varied")
+        write_leaderboard(read_entries([suite, tmp_path / "by-camera"]), page)
+        assert {(kept.agent, kept.division) for kept in kept_entries(page)} == {("x", "camera"), ("x", "lidar")}
+        assert [line for line in page.read_text().splitlines() if line.startswith("#")] == [
+            "## Division lidar",
+            "## Division camera",
+        ]
+        for path in (tmp_path / "by-camera").glob("x/*"):
+            edit_task(path, sensors=["egocentric", "depth"])
+        with pytest.raises(
+            InputError, match=r"egocentric \(look varied\) \(division camera\), found egocentric, depth"
+        ):
+            read_entries([tmp_path / "by-camera"])
 
     def test_the_page_of_the_docs_is_made_from_the_kept_entries(self):
         assert f"{BEGIN}{make_tables(kept_entries(PAGE))}{END}" in PAGE.read_text(encoding="utf-8")

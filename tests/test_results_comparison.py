@@ -115,10 +115,15 @@ class TestResults:
 
     def test_the_title_says_what_an_agent_was_told_less_or_more(self, tmp_path):
         told = {"shown": {}, "hidden": {"hide": ["map", "goal"]}, "exact": {"exact_pose": True}}
+        told["seeing"] = {"sensors": ["lidar", "egocentric"], "look": "varied", "camera_fov": 170.0}
         for name, changes in told.items():
             make_result(tmp_path / name, "navigator", task="adrift", num_mazes=2, record=False)
             edit_task(tmp_path / name, **changes)
-        for name, who in (("hidden", "navigator without map and goal"), ("exact", "navigator with the true pose")):
+        for name, who in (
+            ("hidden", "navigator without map and goal"),
+            ("exact", "navigator with the true pose"),
+            ("seeing", r"navigator with lidar, egocentric (fov 170, look varied)"),
+        ):
             title = compare_folders(tmp_path / "shown", tmp_path / name).title
             assert title.startswith("A is navigator (track adrift, level 1) in ")
             assert f"B is {who} (track adrift, level 1) in {tmp_path / name}; " in title

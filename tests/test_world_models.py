@@ -23,7 +23,7 @@ def golden_maze() -> Maze:
 
 class TestMazeModels:
     def test_models_that_were_used_last_are_kept(self, monkeypatch):
-        monkeypatch.setattr(models, "_MOST_SHOWN", 30)
+        monkeypatch.setattr(models, "_MOST_GEOMS", 20)
         whole = models.MazeModels([golden_maze(), generate("dfs", 13, np.random.default_rng(0)), golden_maze()])
         first, second = whole[0], whole[1]
         assert whole[1] is second

@@ -29,6 +29,7 @@ NAME = "camera-ranges"
 _SIZE = 64  # pixels of a picture's side
 _NEAREST = 0.15  # m
 _FARTHEST = MAX_RANGE + 0.5  # m, of what is learned
+_FAR_SCALES = 1.0
 SURE = 0.025  # m, the largest scale of a range that is trusted; chosen on train mazes
 # The beam model's: m, the share of rays that read the largest range, or anything, and 1/m.
 _SIGMA, _LOST, _RANDOM, _GROWTH = 0.03, 0.01, 0.05, 0.015
@@ -118,7 +119,7 @@ class CameraRanges:
         """
         rows = np.arange(len(pictures)) if chosen is None else np.flatnonzero(chosen)
         ranges, scales = self._network.read(pictures[rows])
-        is_far = ranges > MAX_RANGE - 0.1
+        is_far = 1 / ranges + _FAR_SCALES * scales / ranges**2 < 1 / (MAX_RANGE - 0.1)
         found = np.full((len(pictures), NUM_RAYS), np.nan)
         found[np.ix_(rows, self._rays)] = np.where(is_far, MAX_RANGE, np.where(scales > SURE, np.nan, ranges))
         return found

@@ -104,7 +104,10 @@ class Senses:
     """The senses of a robot in the environments of one interface, with their lidar or camera if they have one."""
 
     def __init__(self, interface: Interface, agent: str):
-        """Raises `UnplayableError`, in the name of `agent`, if maps are shown with less than a pixel per cell."""
+        """Raises `UnplayableError`, in the name of `agent`, if maps have less than a pixel per cell.
+
+        It raises it also if there are sensors, but no lidar and no camera that it can read ranges from.
+        """
         if interface.context_size < interface.size:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
@@ -112,12 +115,14 @@ class Senses:
         self._beams, self._camera = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size), None
         self._has_ranges = "lidar" in interface.sensors
         self.feels, self.is_narrow = not self._has_ranges, False  # whether it also feels walls, and sees ahead only
-        if interface.camera is not None and not self._has_ranges and "egocentric" in interface.sensors:
+        if interface.camera is not None and "egocentric" in interface.sensors and not self._has_ranges:
             from .camera_ranges import CameraRanges  # which needs PyTorch
 
             self._camera, self._has_ranges = CameraRanges(interface.camera, agent), True
             self._beams = self._camera.beams(1 / self._cell_size)
             self.is_narrow = interface.camera.fov < _ALL_ROUND
+        elif interface.sensors:
+            interface.require_sensor("lidar", agent)
 
     def look(self, inputs: Inputs) -> Inputs:
         """Returns inputs in which robots without a lidar have ranges from their pictures in its place."""

@@ -36,7 +36,8 @@ def evaluate(
             help="Evaluations by name instead: paper, the paper's protocol; quick, minutes of it; tracks, every track "
             "at all levels; tracks-dev, in the mazes to choose agents by; tracks-no-map, with the map hidden; "
             "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
-            "tracks-goals and tracks-goals-dev, three goals in a row where doors have moved."
+            "tracks-camera and tracks-camera-dev, by camera alone; tracks-goals and tracks-goals-dev, three goals in "
+            "a row where doors have moved."
         ),
     ] = None,
     out: Annotated[

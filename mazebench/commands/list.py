@@ -28,7 +28,7 @@ def list_() -> None:
     }
     for name, text in rows.items():
         print(f"{name + ':':<12} {text}")
-    print("\ntracks, each with levels 1 to 3 and the sensor lidar:")
+    print("\ntracks, each with levels 1 to 3 and, unless sensors are named, the lidar:")
     for name, track in TRACKS.items():
         print(f"{name + ':':<12} {track.help}")
         for number, level in enumerate(track.levels, 1):

@@ -16,7 +16,6 @@ from mazebench.errors import InputError
 from mazebench.tasks.arguments import Arguments, reset_options
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
-from mazebench.world.models import models_of
 from mazebench.world.near_walls import near_walls_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import MujocoSimulation
@@ -105,7 +104,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         if self.render_mode is None:
             return None
         if self._cameras is None:
-            self._cameras = Cameras(models_of(self.task.mazes), (self._camera,))
+            self._cameras = Cameras(self.task.mazes, (self._camera,))
         data = self.simulation.data
         return self._cameras.take(self.runner.rules.maze.item(), data.qpos, data.mocap_pos[0])[self._camera]
 

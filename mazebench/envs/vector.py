@@ -26,7 +26,6 @@ from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.rules import Rules
 from mazebench.tasks.task import Task
 from mazebench.world.batch import open_batch
-from mazebench.world.models import models_of
 from mazebench.world.near_walls import WallGeoms, near_walls_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import states_from_sensors
@@ -320,7 +319,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(models_of(self.task.mazes), ("top",))
+            self._top_camera = Cameras(self.task.mazes, ("top",))
         worlds = zip(self.rules.maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 

@@ -20,6 +20,7 @@ from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
+from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.trials import Trial, select_trials
@@ -174,13 +175,21 @@ def _square(side: int) -> str:
 
 
 def task_as_played(agent: str, agent_class: type[Agent], asked: TaskOptions, resolver: Callable[..., Task]) -> Task:
-    """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
+    """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps.
+
+    Raises:
+      UnplayableError: if sensors other than the lidar are named, and the agent needs more.
+    """
     plays = agent_class.plays_actions
     if asked.actions is None and "six" not in plays:
         asked = asked.replace(actions=plays[0])
-    missing = tuple(name for name in agent_class.needs_sensors if name not in asked.sensors)
-    asked = asked.replace(sensors=(*asked.sensors, *missing), context_size=None)
-    return resolver(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
+    if asked.sensors in ((), (LIDAR,)):
+        asked = asked.replace(sensors=tuple(dict.fromkeys((*asked.sensors, *agent_class.needs_sensors))))
+    asked = asked.replace(context_size=None)
+    task = resolver(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
+    for name in agent_class.needs_sensors:
+        task.interface.require_sensor(name, agent)
+    return task
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:

@@ -25,9 +25,11 @@ from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.looks import VARIED
 
 _DEFAULT_RUN = RunOptions()
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
+_CAMERA: dict[str, Any] = {"sensors": ("egocentric",), "camera_size": 64, "camera_fov": 75.0, "look": VARIED}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,6 +77,8 @@ SUITES: dict[str, tuple[Part, ...]] = {
     ),
     "tracks": _each_level(),
     "tracks-dev": _each_level(split=DEV),  # to choose agents by
+    "tracks-camera": _each_level(**_CAMERA),  # by camera alone
+    "tracks-camera-dev": _each_level(split=DEV, **_CAMERA),
     # What agents are measured against: without the map, without map and goal, with the true pose.
     "tracks-no-map": _each_level(hide=("map",)),
     "tracks-no-goal": _each_level(hide=("map", "goal")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from mazebench.maps.maze import Maze
 NUM_FRESH = 2**31  # mazes, so that an episode hardly ever meets one of another episode
 # First numbers of the seeds: no maze of one purpose is another one of another purpose.
 _SEEDS = {"train": 41_000, "dev": 42_000, "fresh": 43_000}
+_NUM_ROWS = 512  # of `MazeRows`, unless more mazes are met at once
 _NUM_KEPT = 1024  # fresh mazes; with its distances one of 31 x 31 takes some 40 kB
 
 
@@ -58,6 +60,34 @@ class FreshMazes:
 
 # The mazes of a task.
 Mazes = tuple[Maze, ...] | FreshMazes
+
+
+class MazeRows:
+    """Arrays with a row for each maze that was met of late; `K` is the number of mazes that are asked for."""
+
+    def __init__(self, row_of: Callable[[int], Sequence[np.ndarray]]):
+        """Takes a function that returns the row of a maze, by its index, in each of the arrays."""
+        self._row_of = row_of
+        self._place_of: dict[int, int] = {}
+        self.arrays: tuple[np.ndarray, ...] = ()  # `[P, ...]` each; replaced where they grow
+
+    def places(self, maze: np.ndarray) -> np.ndarray:
+        """Returns where the rows of some mazes are, `[K]` int, and makes those that are not there."""
+        numbers = maze.tolist()
+        wanted = set(numbers)
+        new = wanted - self._place_of.keys()
+        if len(self._place_of) + len(new) > max(_NUM_ROWS, 2 * len(wanted)):  # begin again with those of now
+            self._place_of, new = {}, wanted
+        for number in new:
+            place, row = len(self._place_of), self._row_of(number)
+            if not self.arrays:
+                self.arrays = tuple(np.array(values)[None] for values in row)
+            elif place == len(self.arrays[0]):
+                self.arrays = tuple(np.resize(kept, (2 * place, *kept.shape[1:])) for kept in self.arrays)
+            for kept, values in zip(self.arrays, row, strict=True):
+                kept[place] = values
+            self._place_of[number] = place
+        return np.array([self._place_of[number] for number in numbers])
 
 
 @functools.lru_cache(maxsize=_NUM_KEPT)

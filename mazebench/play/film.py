@@ -26,7 +26,6 @@ from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.sensors import LIDAR, SENSORS
 from mazebench.tasks.sensors.cameras import as_colors
 from mazebench.tasks.shown_map import show_map
-from mazebench.world.models import models_of
 from mazebench.world.ray_casting import ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
 
@@ -119,7 +118,7 @@ class _Scene:
         self._path: list[np.ndarray] = []  # [2] m each
         self.record_position()
         names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.sensors)
-        self._cameras = Cameras(models_of(self._task.mazes), names, self.pixels) if names else None
+        self._cameras = Cameras(self._task.mazes, names, self.pixels) if names else None
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""

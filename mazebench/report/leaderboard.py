@@ -2,7 +2,7 @@
 
 `python -m mazebench.report.leaderboard RESULTS... docs/leaderboard.md` writes an entry of each agent in RESULTS into
 the folder docs/leaderboard, one JSON file each, and the tables of all entries there into the page, between two
-comments.
+comments. A division holds the agents that observe the sensors of one suite, and no others.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import pydantic
 
 from mazebench.constants import ON_TIME, STEP_TIME
 from mazebench.errors import InputError
+from mazebench.evaluation.suites import SUITES
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.results.intervals import mean_interval
@@ -34,12 +35,16 @@ from mazebench.world.near_walls import FASTEST
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
 PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
+LIDAR, CAMERA = "lidar", "camera"
+SUITE_OF = {LIDAR: "tracks", CAMERA: "tracks-camera"}  # by division
+DIVISIONS = {SUITES[suite][0].task.sensors_in_words: division for division, suite in SUITE_OF.items()}  # by sensors
 
 
 class Entry(pydantic.BaseModel):
     """The results of one agent on all parts of the tracks."""
 
     agent: Name
+    division: str = LIDAR
     privileged: bool
     code: tuple[str, ...]  # package and version, or "file", and the SHA-256 of the code or "without hash"
     checkpoints: tuple[str, ...]  # SHA-256
@@ -50,7 +55,7 @@ class Entry(pydantic.BaseModel):
 
 
 def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
-    """Returns the entries of runs of the suite `tracks`, of agents' folders in them, or of folders with its parts.
+    """Returns the entries of runs of a division's suite, of agents' folders in them, or of folders with its parts.
 
     Raises:
       InputError: if an agent's folder holds anything else than its results of all parts, each once.
@@ -69,7 +74,13 @@ def kept_entries(page: pathlib.Path) -> list[Entry]:
 
 
 def make_tables(entries: Sequence[Entry]) -> str:
-    """Returns the leaderboard in Markdown: a table of all episodes, and two of the parts, on time and success."""
+    """Returns the leaderboard in Markdown: the tables of each division that has entries."""
+    of_divisions = {name: [entry for entry in entries if entry.division == name] for name in DIVISIONS.values()}
+    return "\n".join(f"## Division {name}\n\n{_tables_of(own)}" for name, own in of_divisions.items() if own)
+
+
+def _tables_of(entries: Sequence[Entry]) -> str:
+    """Returns the tables of a division: one of all episodes, and two of the parts, on time and success."""
     # Gains are over the navigator without the map.
     floor = next((entry.on_time[0] for entry in entries if entry.agent == "navigator without map"), np.nan)
     names = [escape_markdown(entry.agent) + " (privileged)" * entry.privileged for entry in entries]
@@ -109,8 +120,9 @@ def write_leaderboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
         raise InputError(f"{page}: expected the lines {BEGIN.strip()} and {END.strip()}, found no such lines")
     make_folder(page.with_suffix(""))
     for entry in entries:
-        # Entries of the same agent, code and checkpoints share a name.
-        identity = hashlib.sha256("\n".join([entry.agent, *entry.code, *entry.checkpoints]).encode()).hexdigest()
+        # Entries of the same agent, code, checkpoints and division share a name.
+        key = [entry.agent, *entry.code, *entry.checkpoints, *([] if entry.division == LIDAR else [entry.division])]
+        identity = hashlib.sha256("\n".join(key).encode()).hexdigest()
         name = f"{re.sub(r'[^A-Za-z0-9_]+', '-', entry.agent)}-{identity[:8]}.json"
         write_json(page.with_suffix("") / name, entry.model_dump(mode="json"))
     page.write_text(f"{before}{begin}{make_tables(kept_entries(page))}{end}{after}", encoding="utf-8")
@@ -126,11 +138,17 @@ def _make_entry(folder: pathlib.Path) -> Entry:
         found = ", ".join(summary.task.title for summary in summaries)
         raise InputError(f"{folder}: expected one result of each of {', '.join(PARTS)}, found {found}")
 
+    sensors = summaries[0].task.sensors_in_words
+    if sensors not in DIVISIONS:
+        divisions = " or ".join(f"{each} (division {name})" for each, name in DIVISIONS.items())
+        raise InputError(f"{folder}: expected the sensors {divisions}, found {sensors}")
+
     mean = mean_interval(episodes.on_time.to_numpy(float), episodes.maze.to_numpy())
     parts = episodes.groupby("part")[["on_time", "success"]].mean()
     origins = [summary.provenance for summary in summaries]
     return Entry(
-        agent=agents[0],
+        agent=agents[0].replace(f" with {sensors}", ""),
+        division=DIVISIONS[sensors],
         privileged=any(summary.privileged for summary in summaries),
         code=tuple(
             sorted(

@@ -11,6 +11,7 @@ import pydantic
 from mazebench.errors import one_line
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.storage.json_files import to_line
+from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS, distance_of
 
@@ -146,8 +147,14 @@ class Summary(_Stored):
 
     @property
     def row(self) -> str:
-        """The agent, its actions unless it has the six, and what it was told less or more: "navigator without map"."""
+        """The agent with what sets its result apart, except for privileges: "navigator without map".
+
+        These are its actions unless it has the six, its sensors unless they are the task's own (the lidar on a track),
+        and what it was told less or more.
+        """
         acting = "" if self.task.actions in (None, "six") else f" with {self.task.actions} actions"
+        sensors = self.task.sensors_in_words
+        acting += "" if sensors == (LIDAR if self.task.track else "") else f" with {sensors}"
         without = f" without {' and '.join(self.task.hide)}" if self.task.hide else ""
         return self.agent + acting + without + (" with the true pose" if self.task.exact_pose else "")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from mazebench.constants import VELOCITIES
+from mazebench.errors import UnplayableError
 from mazebench.world.looks import Camera
 from mazebench.world.ray_casting import LidarModel
 
@@ -28,3 +29,11 @@ class Interface:
     def action_shape(self) -> tuple[int, ...]:
         """The shape of an action: () for one of six or four, (3,) or (2,) for velocities."""
         return (len(VELOCITIES[self.actions]),) if self.actions in VELOCITIES else ()
+
+    def require_sensor(self, name: str, agent: str) -> None:
+        """Raises `UnplayableError` if there is no sensor called `name`, which `agent` needs."""
+        if name not in self.sensors:
+            found, both = ", ".join(self.sensors), ",".join((name, *self.sensors))
+            raise UnplayableError(
+                f"agent {agent!r}: expected the sensor {name}, found {found}; add it: --sensors {both}"
+            )

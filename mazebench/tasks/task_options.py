@@ -216,7 +216,7 @@ class TaskOptions(SensorOptions, ReadOptions):
     ] = ()
     sensors: Annotated[
         tuple[Annotated[str, OneOf(*SENSORS)], ...],
-        Doc("Sensors that are observed besides the state and the context; a track adds the lidar."),
+        Doc("Sensors that are observed besides the state and the context; on a track the lidar, if none are named."),
     ] = ()
     context_size: Annotated[
         int | None,
@@ -238,8 +238,8 @@ class TaskOptions(SensorOptions, ReadOptions):
                 object.__setattr__(self, "shown", texts_of(self.shown, self.mazes, self.reading))
             object.__setattr__(self, "mazes", own_mazes(self.mazes, self.reading))
         object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
-        if self.track is not None and LIDAR not in self.sensors:
-            object.__setattr__(self, "sensors", (LIDAR, *self.sensors))
+        if self.track is not None and not self.sensors:
+            object.__setattr__(self, "sensors", (LIDAR,))
         self._check()
 
     @classmethod
@@ -407,6 +407,17 @@ class TaskOptions(SensorOptions, ReadOptions):
         """The noise on the senses that a user set, in words."""
         noise = {"lidar noise": self.lidar_noise, "odometry noise": self.odometry_noise}
         return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
+
+    @property
+    def sensors_in_words(self) -> str:
+        """The sensors, and the options of the camera that were changed: "lidar, egocentric (fov 170, look varied)"."""
+        words, changed = ", ".join(self.sensors), self.changed()
+        camera = [
+            f"{name.removeprefix('camera_')} {changed[name]}".removesuffix(".0")
+            for name in CAMERA_OPTIONS
+            if name in changed and PICTURES.keys() & {*self.sensors}
+        ]
+        return f"{words} ({', '.join(camera)})" if camera else words
 
     @property
     def own_in_words(self) -> tuple[str, ...]:

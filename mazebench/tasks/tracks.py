@@ -46,8 +46,8 @@ class Track:
     """A named way in which the map or the senses are imperfect.
 
     A track is played as the local task, in mazes of 31 x 31 cells of several kinds, or in buildings of one's own. It
-    offers the sensor `lidar`, that of a TurtleBot3. Its mazes, distances, context size and time limit are fixed, so
-    that results of one track and level can be compared. Lengths are in metres.
+    offers the sensor `lidar`, that of a TurtleBot3, unless others are named. Its mazes, distances, context size and
+    time limit are fixed, so that results of one track and level can be compared. Lengths are in metres.
     """
 
     help: str  # in one line

@@ -56,29 +56,19 @@ def maze_spec(maze: Maze, for_robot: bool = False) -> mujoco.MjSpec:
     Raises:
       InputError: if it has more boxes than MuJoCo puts together in some seconds.
     """
-    require_whole(maze)
+    if len(maze.boxes) > MAX_BOXES:
+        raise InputError(
+            f"{maze.name}: expected a maze of at most {MAX_BOXES} wall boxes for a whole model, found "
+            f"{len(maze.boxes)}; the Gymnasium and vector environments take it"
+        )
     spec = boxes_spec(maze, *wall_boxes(maze), for_robot)
     spec.modelname = maze.name
     return spec
 
 
-def has_whole_model(maze: Maze) -> bool:
-    """Returns whether MuJoCo puts the whole model of a maze together in some seconds."""
-    return len(maze.boxes) <= MAX_BOXES
-
-
 def largest_spec(maze: Maze) -> mujoco.MjSpec:
     """Returns the whole model of a maze, or one without walls if it has too many boxes for that."""
-    return maze_spec(maze) if has_whole_model(maze) else boxes_spec(maze, *np.zeros((2, 0, 3)))
-
-
-def require_whole(maze: Maze) -> None:
-    """Raises `InputError` if a maze has too many boxes for that."""
-    if not has_whole_model(maze):
-        raise InputError(
-            f"{maze.name}: expected a maze of at most {MAX_BOXES} wall boxes for a whole model, found "
-            f"{len(maze.boxes)}; the Gymnasium and vector environments take it"
-        )
+    return maze_spec(maze) if len(maze.boxes) <= MAX_BOXES else boxes_spec(maze, *np.zeros((2, 0, 3)))
 
 
 def wall_boxes(maze: Maze) -> tuple[np.ndarray, np.ndarray]:

@@ -18,13 +18,12 @@ import numpy as np
 
 from mazebench.kernels import compiled, num_threads
 from mazebench.maps import colors
-from mazebench.maps.drawn import Mazes
+from mazebench.maps.drawn import MazeRows, Mazes
 from mazebench.maps.maze import WALL_HEIGHT
 from mazebench.world import looks
 from mazebench.world.looks import MAX_DEPTH, NUM_NOISE, TEXELS, Camera, Look
 
 _WIDEST_PINHOLE = 120.0  # degrees
-_MOST_KEPT = 512  # looks, unless more mazes are seen at once
 _FEWEST_PER_THREAD = 8  # pictures
 _SKY, _FLOOR, _WALL, _GOAL = range(len(looks.LABELS))
 _DISC_RADIUS, _DISC_HEIGHT, _DISC_OPACITY = 0.3, 0.04, 0.91  # cells, m; MuJoCo blends its opacity of .7 twice
@@ -221,15 +220,11 @@ class RayCamera:
 
     def __init__(self, mazes: Mazes, camera: Camera, look: str = looks.PLAIN, is_unseen: bool = False):
         """Takes pictures of a look, as `looks.look_of`."""
-        self._mazes, self._look, self._is_unseen = mazes, look, is_unseen
-        self._camera, self._lens = camera, lens_of(camera, mazes[0].cell_size)
-        self._slot_of = {0: 0}  # where the look of a maze is among `_looks`
-        self._looks = Look(*(values[None] for values in self._draw_look(0)))
+        self._camera, self._cell_size = camera, mazes[0].cell_size
+        self._lens = lens_of(camera, self._cell_size)
+        self._looks = MazeRows(lambda maze: looks.look_of(mazes[maze], look, is_unseen))
         self.masks = looks.patterns()  # for a learner that draws others
         self._threads: ThreadPoolExecutor | None = None  # which end with it
-
-    def _draw_look(self, maze: int) -> Look:
-        return looks.look_of(self._mazes[maze], self._look, self._is_unseen)
 
     def take(
         self,
@@ -252,12 +247,12 @@ class RayCamera:
           noise_at: `[B]` int below `looks.NUM_NOISE`, the place of a picture's noise; -1 for none.
           threads: that draw; 0 for all cores.
         """
-        count, slots = len(pose), self._slots(maze)
+        count, slots = len(pose), self._looks.places(maze)
         pictures: tuple[np.ndarray, ...] = tuple(
             np.empty((count * (name in names), self._camera.size, self._camera.size, *shape), kind)
             for name, (shape, kind, _) in looks.PICTURES.items()
         )
-        scene = (self._camera, self._lens, self._looks, self._mazes[0].cell_size, slots, pose, marker)
+        scene = (self._camera, self._lens, Look(*self._looks.arrays), self._cell_size, slots, pose, marker)
 
         def draw(begin: int, end: int) -> None:
             _draw(begin, end, *scene, self.masks, _DISC_COLOR, gain, noise_at, _noise(), pictures)
@@ -270,17 +265,3 @@ class RayCamera:
         else:
             draw(0, count)
         return {name: values for name, values in zip(looks.PICTURES, pictures, strict=True) if name in names}
-
-    def _slots(self, maze: np.ndarray) -> np.ndarray:
-        """Returns where the looks of mazes are kept, `[B]` int, and draws those that are not there."""
-        numbers = maze.tolist()
-        new = set(numbers) - self._slot_of.keys()
-        if len(self._slot_of) + len(new) > _MOST_KEPT:  # begin anew, with those that are needed now
-            self._slot_of, new = {}, set(numbers)
-        for number in new:
-            slot = self._slot_of[number] = len(self._slot_of)
-            if slot == len(self._looks.grid):
-                self._looks = Look(*(np.resize(kept, (2 * slot, *kept.shape[1:])) for kept in self._looks))
-            for kept, values in zip(self._looks, self._draw_look(number), strict=True):
-                kept[slot] = values
-        return np.array([self._slot_of[number] for number in numbers])

@@ -9,12 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.maps.drawn import FreshMazes, Mazes
+from mazebench.maps.drawn import MazeRows, Mazes
 
 NUM_RAYS = 32
 MAX_RANGE = 5.0  # m
-
-_NUM_FRESH = 512  # fresh mazes whose walls are kept
 
 
 class LidarModel(NamedTuple):
@@ -53,29 +51,8 @@ class Lidar:
 
     def __init__(self, mazes: Mazes, max_range: float = MAX_RANGE):
         """Sees as far as `max_range` (m)."""
-        self._size, self._cell_size = mazes[0].size, mazes[0].cell_size
-        self._max_range = max_range
-        self._mazes = mazes
-        self._index_of: dict[int, int] | None = None  # of fresh mazes, where those that bodies are in are in `_walls`
-        if isinstance(mazes, FreshMazes):
-            self._index_of = {}
-            self._walls = np.empty((_NUM_FRESH, self._size, self._size), dtype=bool)
-        else:
-            self._walls = np.stack([maze.walls for maze in mazes])
-
-    def _indices(self, maze: np.ndarray) -> np.ndarray:
-        """Returns where some mazes are in `_walls`, `[K]` int, and puts those that are not there into it."""
-        if self._index_of is None:
-            return maze
-        numbers = maze.tolist()
-        new = set(numbers) - self._index_of.keys()
-        if len(self._index_of) + len(new) > len(self._walls):  # begin anew, with those that are needed now
-            self._index_of, new = {}, set(numbers)
-            self._walls = np.empty((max(len(self._walls), 2 * len(new)), self._size, self._size), dtype=bool)
-        for number in new:
-            index = self._index_of[number] = len(self._index_of)
-            self._walls[index] = self._mazes[number].walls
-        return np.array([self._index_of[number] for number in numbers])
+        self._max_range, self._cell_size = max_range, mazes[0].cell_size
+        self._walls = MazeRows(lambda number: (mazes[number].walls,))
 
     def ranges(self, maze: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """Returns the distances to the nearest walls along the rays of K bodies: `[K, 32]` float32, m.
@@ -88,5 +65,5 @@ class Lidar:
         """
         from mazebench.world.ray_kernels import cast  # which needs numba
 
-        index = self._indices(maze)  # before `_walls` is read, which it may change
-        return cast(self._walls, index, pose, NUM_RAYS, self._cell_size, self._max_range)
+        places = self._walls.places(maze)  # before the walls are read, which it may replace
+        return cast(*self._walls.arrays, places, pose, NUM_RAYS, self._cell_size, self._max_range)

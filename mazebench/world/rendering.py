@@ -10,64 +10,70 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
+from mazebench.maps.drawn import Mazes
 from mazebench.world.backend import RenderingError, rendering_error
-from mazebench.world.models import MazeModels, Seen
+from mazebench.world.mjcf import boxes_spec, wall_boxes
 
 CAMERAS = ("top", "chase", "egocentric")
 _PICTURE_SIZE = 480  # pixels a side
 
 
 class Cameras:
-    """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them."""
+    """Pictures of mazes of one size through one rendering context, which opens with the first of them.
 
-    def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE):
+    One model without walls does for all mazes: a picture is given the boxes.
+    """
+
+    def __init__(self, mazes: Mazes, names: tuple[str, ...], pixels: int = _PICTURE_SIZE):
         """`names` are of `CAMERAS`, `pixels` is the side of a picture."""
+        self._mazes, self._names, self._pixels = mazes, names, pixels
+        self._model = boxes_spec(mazes[0], *np.zeros((2, 0, 3))).compile()
+        self._data = mujoco.MjData(self._model)
+        self._middle, self._half = np.zeros((2, 0, 3))  # of the boxes of the maze that was seen last
+        self._maze = -1  # and its index
         self._renderer: mujoco.Renderer | None = None
-        self._models = models
-        self._names, self._pixels = names, pixels
-        self._most_shown = 0  # geoms and sites that the context has room for
-        self._added: Seen | None = None  # whose boxes the scene has
+        self._most_boxes = 0  # that the context has room for
+        self._drawn = -1  # the index of the maze whose boxes the scene has
 
     def take(self, maze: int, qpos: np.ndarray, marker: np.ndarray) -> dict[str, np.ndarray]:
         """Returns `[pixels, pixels, 3]` uint8 by camera.
 
         Args:
-          maze: its index among the models.
+          maze: its index among the mazes.
           qpos: `[3]`, the body's x, y (m) and yaw (rad).
           marker: `[3]` m, where the goal marker stands.
 
         Raises:
           RenderingError: if no rendering context can be opened; the message says what to set.
         """
-        seen = self._models.seen(maze)
-        if self._renderer is None or self._most_shown < seen.num_shown:
+        if maze != self._maze:
+            self._maze, (self._middle, self._half) = maze, wall_boxes(self._mazes[maze])
+        if self._renderer is None or self._most_boxes < len(self._middle):
             self.close()
-            self._renderer = self._open(2 * seen.num_shown)  # for mazes with more walls
-        seen.data.qpos[:], seen.data.mocap_pos[0] = qpos, marker
-        mujoco.mj_kinematics(seen.model, seen.data)
-        mujoco.mj_camlight(seen.model, seen.data)
-        return {name: self._render(self._renderer, seen, name) for name in self._names}
+            self._renderer = self._open(2 * len(self._middle))  # for mazes with more walls
+        self._data.qpos[:], self._data.mocap_pos[0] = qpos, marker
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        return {name: self._render(self._renderer, name) for name in self._names}
 
-    def _render(self, renderer: mujoco.Renderer, seen: Seen, camera: str) -> np.ndarray:
-        view = mujoco.MjvCamera()
-        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, seen.model.camera(camera).id
+    def _render(self, renderer: mujoco.Renderer, camera: str) -> np.ndarray:
+        view, scene = mujoco.MjvCamera(), renderer.scene
+        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, self._model.camera(camera).id
         every = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(seen.model, seen.data, mujoco.MjvOption(), None, view, every, renderer.scene)
+        mujoco.mjv_updateScene(self._model, self._data, mujoco.MjvOption(), None, view, every, scene)
 
-        # The boxes that the model lacks come behind its geoms, where the next update leaves them.
-        scene = renderer.scene
-        first, last = scene.ngeom, scene.ngeom + len(seen.middle)
-        if self._added is not seen:
-            set_boxes(scene.geoms[first:last], seen.middle, seen.half, seen.model.material("wall").rgba)
-        self._added, scene.ngeom = seen, last
+        # The boxes come behind the model's geoms, where the next update leaves them.
+        first, last = scene.ngeom, scene.ngeom + len(self._middle)
+        if self._drawn != self._maze:
+            set_boxes(scene.geoms[first:last], self._middle, self._half, self._model.material("wall").rgba)
+        self._drawn, scene.ngeom = self._maze, last
         return renderer.render()
 
-    def _open(self, most_shown: int) -> mujoco.Renderer:
-        self._most_shown, self._added = most_shown, None
+    def _open(self, most_boxes: int) -> mujoco.Renderer:
+        self._most_boxes, self._drawn = most_boxes, -1
+        most_shown = self._model.ngeom + self._model.nsite + most_boxes
         with opening_context():
-            renderer = mujoco.Renderer(
-                self._models.seen(0).model, self._pixels, self._pixels, max_geom=self._most_shown
-            )
+            renderer = mujoco.Renderer(self._model, self._pixels, self._pixels, max_geom=most_shown)
 
         # The cameras close before the interpreter unloads the modules that closing needs. Exit functions run in reverse
         # order: registered again after a context is opened, this one runs before the backend's.

@@ -7,7 +7,7 @@ from mazebench.tasks.sensors.lidar import LidarSensor
 from mazebench.tasks.sensors.sensor import Sensor
 from mazebench.world.looks import PICTURES
 
-LIDAR = "lidar"  # the sensor that every track offers
+LIDAR = "lidar"  # the sensor of a track, unless others are named
 SENSORS: dict[str, type[Sensor]] = {
     **dict.fromkeys(PICTURES, CameraSensor),
     LIDAR: LidarSensor,
