@@ -59,7 +59,7 @@ def test_a_picture_is_read_alike_in_any_batch():
 @pytest.mark.parametrize("camera", [Camera(fov=90), Camera(size=32), Camera(pitch=10)], ids=str)
 def test_another_camera_is_refused(camera):
     with pytest.raises(
-        UnplayableError, match="agent 'navigator': expected a lidar, or a camera of 64 pixels and 75, 170"
+        UnplayableError, match="expected a lidar, or a camera of 64 pixels and 75, 170, 360"
     ):
         CameraRanges(camera, "navigator")
 
