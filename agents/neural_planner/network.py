@@ -30,8 +30,8 @@ _POINTS = torch.tensor(  # [P, 2], the body, then points ahead of it and to its 
         for angle in range(_ANGLES)
     ]
 )
-NUM_MOTION = 3 + 2 * NUM_ACTIONS
-_NUM_FEATURES = 3 * len(_POINTS) + NUM_RANGES + NUM_MOTION + 2
+_NUM_MOTION = 3 + 2 * NUM_ACTIONS
+_NUM_FEATURES = 3 * len(_POINTS) + NUM_RANGES + _NUM_MOTION + 2
 
 _EVIDENCE = 120 / MOST_EVIDENCE  # levels a unit of log odds, in a picture's bytes
 _UNLIKELY = 32.0  # levels a unit of the log of a goal's likelihood
@@ -52,9 +52,7 @@ class Situation(NamedTuple):
     """`K` states of bodies."""
 
     pose: torch.Tensor  # [K, 3] float32
-    # What is sensed there: [K, 32] float32, ranges to the walls around the body, counter-clockwise from straight ahead;
-    # of a network that reads pictures, these.
-    sight: torch.Tensor
+    ranges: torch.Tensor  # [K, 32] float32, to the walls around the body, counter-clockwise from straight ahead
     motion: torch.Tensor  # [K, 15] float32, see `motion_features`
 
 
@@ -116,8 +114,14 @@ class CostPlanner(nn.Module):
 
         # The points, and the four cells whose centres are around each.
         pose = situation.pose
-        corners, weights = around(pose, _POINTS, size)
-        corners = corners + first
+        cosine, sine = torch.cos(pose[:, 2:]), torch.sin(pose[:, 2:])
+        ahead, left = _POINTS.to(pose.device).T
+        column = (pose[:, :1] + cosine * ahead - sine * left - 0.5).clamp(0, size - 1.001)
+        row = (size - 0.5 - pose[:, 1:2] - sine * ahead - cosine * left).clamp(0, size - 1.001)
+        right, down = column.frac(), row.frac()
+        corner = first + row.long() * size + column.long()
+        corners = torch.stack([corner, corner + 1, corner + size, corner + size + 1])  # [4, K, P]
+        weights = torch.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down])
 
         # How much nearer the goal is there than at the body. A wall outweighs no free cell next to it.
         here = (size - pose[:, 1:2]).long().clamp(0, size - 1) * size + pose[:, :1].long().clamp(0, size - 1)
@@ -130,7 +134,7 @@ class CostPlanner(nn.Module):
                 (nearer - nearer[:, :1]).clamp(-4, 4),
                 (weights * torch.log(plan.cost).flatten()[corners]).sum(0) / 3,
                 (weights * plan.wall.flatten()[corners]).sum(0),
-                situation.sight / REACH,
+                situation.ranges / REACH,
                 situation.motion,
                 torch.tanh(way_left / 5),
                 torch.tanh(way_left / 40),
@@ -139,25 +143,8 @@ class CostPlanner(nn.Module):
         )
 
 
-def around(pose: torch.Tensor, points: torch.Tensor, size: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """Returns the four cells `[4, K, P]` int around points, as row * L + column, and their weights, which sum to 1.
-
-    The points `[P, 2]` lie ahead of bodies and to their left. The poses `[K, 3]` are on grids of `size` cells a side.
-    """
-    cosine, sine = torch.cos(pose[:, 2:]), torch.sin(pose[:, 2:])
-    ahead, left = points.to(pose.device).T
-    column = (pose[:, :1] + cosine * ahead - sine * left - 0.5).clamp(0, size - 1.001)
-    row = (size - 0.5 - pose[:, 1:2] - sine * ahead - cosine * left).clamp(0, size - 1.001)
-    right, down = column.frac(), row.frac()
-    corner = row.long() * size + column.long()
-    corners = torch.stack([corner, corner + 1, corner + size, corner + size + 1])
-    return corners, torch.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down])
-
-
 class PlannerNetwork(CostPlanner):
     """Plans, and acts by what it reads of the plan around the body."""
-
-    plan_class = Plan
 
     def __init__(self, channels: int, hidden: int, ways: bool):
         """`channels` are those of the costs, `hidden` units those of the policy; without `ways`, all cells cost 1."""
@@ -167,12 +154,6 @@ class PlannerNetwork(CostPlanner):
             nn.Linear(hidden, NUM_ACTIONS),
         )  # fmt: skip
         self.value = nn.Sequential(nn.Linear(_NUM_FEATURES, hidden // 2), nn.ReLU(), nn.Linear(hidden // 2, 1))
-
-    @staticmethod
-    def scalars(plan: Plan) -> dict[str, torch.Tensor]:
-        """Returns what a learner logs of a plan, by name: the mean costs of walls and of free cells."""
-        wall = plan.wall > 0.5
-        return {"wall_cost": plan.cost[wall].mean(), "free_cost": plan.cost[~wall].mean()}
 
     def forward(self, plan: Plan, grid: torch.Tensor, situation: Situation) -> tuple[torch.Tensor, torch.Tensor]:
         """Returns logits `[K, 6]` and values `[K]` of states on the grids `grid` (`[K]` int) of a plan."""

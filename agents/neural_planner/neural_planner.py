@@ -6,35 +6,73 @@ docs/agents/neural_planner.md describes the network and both ways to train it.
 from __future__ import annotations
 
 import copy
-from typing import ClassVar, Self
+import dataclasses
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import torch
 
 from mazebench.agent import Inputs, Interface, Report
+from mazebench.constants import NUM_ACTIONS, YAW_RATE
 
-from ..robot.body import Body
+from ..common.actor import NetworkAgent, acting
+from ..common.layers import in_batches
 from ..robot.motion import moved_in_the_open
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses, report
-from .network import NUM_RANGES, REACH, PlannerNetwork, grid_bytes
+from .network import NUM_RANGES, REACH, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
-from .plan_reader import ActorState, PlanReader, Robot
+from .planner_learner import PlannerLearner
 
+# Grids and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
+_GRIDS_AT_ONCE = 8
+_STATES_AT_ONCE = 32
 _WALL = 0.5  # probability from which a cell is a wall for these ranges
 
 
-class NeuralPlanner(PlanReader):
+@dataclasses.dataclass
+class Robot:
+    """The knowledge of one environment."""
+
+    memory: Memory
+    noise: np.random.Generator  # of its choice of actions
+    grid: np.ndarray = dataclasses.field(init=False)  # [4, L, L] uint8, of the last plan
+    plan: Plan = dataclasses.field(init=False)  # of [L, L] each
+    age: int = 0  # steps of the leg
+    actions: tuple[int, int] = (-1, -1)  # the last one, and the one before
+
+
+@dataclasses.dataclass
+class ActorState:
+    """The state of acting in B environments."""
+
+    robots: list[Robot | None]
+    choice: Choice | None = None  # of the last step, while exploring
+
+
+class NeuralPlanner(NetworkAgent):
     """Plans on what its senses tell, every few steps, and acts by a policy that reads the plan."""
 
     name: ClassVar[str] = "neural-planner"
+    shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
+    learner_class: ClassVar[type[PlannerLearner]] = PlannerLearner
+    learns_several_tasks = True
+    config: NeuralPlannerConfig
     network: PlannerNetwork
     _senses: Senses
+    _cell_size: float  # m
 
     @classmethod
     def make_network(cls, config: NeuralPlannerConfig, context_size: int) -> PlannerNetwork:
         """Returns a new network, which plans on grids of any size."""
         return PlannerNetwork(config.channels, config.hidden, config.ways)
+
+    @classmethod
+    def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """Returns one goal an episode."""
+        return {"num_goals": 1}
 
     def for_interface(self, interface: Interface) -> Self:
         """Returns an agent with the same network, whose senses are those in the environments of an interface."""
@@ -42,38 +80,111 @@ class NeuralPlanner(PlanReader):
         agent._senses, agent._cell_size = Senses(interface, self.name), interface.cell_size
         return agent
 
+    def explore_from(self, seed: int) -> None:
+        """Begins a new stream of exploration."""
+        self._rng, self._stream = np.random.default_rng([seed, 0]), seed
+
+    def initial_state(self, batch_size: int) -> ActorState:
+        """Returns no robots yet: one is made where an episode begins."""
+        return ActorState([None] * batch_size)
+
+    @acting
+    def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
+        """Returns actions `[B]`, drawn by the policy's probabilities at a low temperature."""
+        # What the robots observe; they plan in their first step of a leg, and every few steps after it.
+        slots = list(range(len(state.robots))) if inputs.active is None else np.flatnonzero(inputs.active).tolist()
+        inputs, robots = self._senses.look(inputs), []
+        for slot in slots:
+            robot = state.robots[slot]
+            memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
+            if robot is None or robot.memory is not memory:  # an episode begins
+                robot = state.robots[slot] = Robot(memory, np.random.default_rng(int(inputs.seed[slot])))
+            if inputs.new_context[slot]:
+                robot.age = 0  # the next leg has another goal
+            robots.append(robot)
+        self._plan([robot for robot in robots if robot.age % self.config.plan_steps == 0])
+
+        # Actions by the policy, at temperature 1 for PPO.
+        situation = self._situation(robots, inputs.observation["state"][slots])
+        logits, value = self._read(robots, situation)
+        exploring = explore and self.config.teacher == "reward"
+        temperature = 1.0 if exploring else self.config.temperature
+        noise = [(self._rng if explore else robot.noise).gumbel(size=NUM_ACTIONS) for robot in robots]
+        chosen = (logits + temperature * np.array(noise).reshape(logits.shape)).argmax(axis=1)
+
+        # The robots remember their actions, and where these should bring the body if no wall is in the way.
+        actions = np.zeros(len(state.robots), dtype=np.int64)
+        for robot, slot, action in zip(robots, slots, chosen.tolist(), strict=True):
+            body = robot.memory.body
+            vx, vy = (self._cell_size * speed for speed in body.velocity())
+            x, y, _, _ = moved_in_the_open(vx, vy, body.yaw, action)
+            robot.memory.command(action, (body.x + x / self._cell_size, body.y + y / self._cell_size))
+            robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1
+            actions[slot] = action
+
+        if explore:
+            log_probability = logits - np.log(np.exp(logits - logits.max(1, keepdims=True)).sum(1, keepdims=True))
+            log_probability -= logits.max(1, keepdims=True)
+            taken = np.take_along_axis(log_probability, chosen[:, None], axis=1)[:, 0]
+            state.choice = Choice(self._stream, [robot.grid for robot in robots], situation, taken, value)
+        return actions, state
+
     def report(self, state: ActorState) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
         return report(robot.memory if robot else None for robot in state.robots)
 
-    def look(self, inputs: Inputs) -> Inputs:
-        """Returns inputs with ranges, which a robot without a lidar reads from its pictures."""
-        return self._senses.look(inputs)
+    def notes(self, state: ActorState) -> Choice | None:
+        """Returns the last choice."""
+        return state.choice
 
-    def observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
-        """Returns the memory after an observation."""
-        return self._senses.observe(memory, inputs, slot)
+    def _plan(self, robots: list[Robot]) -> None:
+        """Plans for robots, those whose grids have one size at once."""
+        for robot in robots:
+            memory = robot.memory
+            walls, goal = memory.estimate()
+            robot.grid = grid_bytes(memory.prior, walls, memory.evidence, goal)
+        for same in _of_one_size(robots):
+            grids = torch.from_numpy(np.stack([robots[index].grid for index in same]))
+            plan = in_batches(self.network.plan, _GRIDS_AT_ONCE, grids)
+            for row, index in enumerate(same):
+                robots[index].plan = Plan(*(part[row] for part in plan))
 
-    def bodies(self, robots: list[Robot], observed: np.ndarray) -> list[Body]:
-        """Returns the bodies as they are localized."""
-        return [robot.memory.body for robot in robots]
-
-    def grid(self, memory: Memory) -> np.ndarray:
-        """Returns the network's input for what is known of walls and goal, `[4, L, L]` uint8."""
-        walls, goal = memory.estimate()
-        return grid_bytes(memory.prior, walls, memory.evidence, goal)
-
-    def sights(self, robots: list[Robot], bodies: list[Body], inputs: Inputs, slots: list[int]) -> np.ndarray:
-        """Returns ranges to the walls around the bodies, `[K, 32]` float32, with those that were seen last."""
+    def _situation(self, robots: list[Robot], observed: np.ndarray) -> Situation:
+        """Returns the states of robots, whose observed ones `[K, 12]` tell how fast they turn."""
+        bodies = [robot.memory.body for robot in robots]
+        pose = np.array([(body.x, body.y, body.yaw) for body in bodies]).reshape(-1, 3)
+        velocity = np.array([(body.forward, body.left) for body in bodies]).reshape(-1, 2)
         ranges = [
-            ranges_to(robot.memory.estimate()[0] > _WALL, body.x, body.y, body.yaw, NUM_RANGES, REACH)
-            for robot, body in zip(robots, bodies, strict=True)
+            ranges_to(robot.memory.estimate()[0] > _WALL, *where, NUM_RANGES, REACH)
+            for robot, where in zip(robots, pose.tolist(), strict=True)
         ]
-        return np.array(ranges, dtype=np.float32).reshape(-1, NUM_RANGES)
+        actions = np.array([robot.actions for robot in robots]).reshape(-1, 2)
+        return Situation(
+            torch.from_numpy(pose.astype(np.float32)),
+            torch.from_numpy(np.array(ranges, dtype=np.float32).reshape(-1, NUM_RANGES)),
+            torch.from_numpy(motion_features(np.column_stack([velocity, observed[:, YAW_RATE]]), actions)),
+        )
 
-    def command(self, memory: Memory, action: int) -> None:
-        """Remembers the action, and where it should bring the body if no wall is in the way."""
-        body = memory.body
-        vx, vy = (self._cell_size * speed for speed in body.velocity())
-        x, y, _, _ = moved_in_the_open(vx, vy, body.yaw, action)
-        memory.command(action, (body.x + x / self._cell_size, body.y + y / self._cell_size))
+    def _read(self, robots: list[Robot], situation: Situation) -> tuple[np.ndarray, np.ndarray]:
+        """Returns logits `[K, 6]` and values `[K]` of the states of robots."""
+        logits, value = np.zeros((len(robots), NUM_ACTIONS), np.float32), np.zeros(len(robots), np.float32)
+        for same in _of_one_size(robots):
+            plan = (torch.stack(parts) for parts in zip(*(robots[index].plan for index in same), strict=True))
+            rows = (part[same] for part in situation)
+            read = in_batches(self._act, _STATES_AT_ONCE, *plan, *rows)
+            logits[same], value[same] = read[:, :-1].numpy(), read[:, -1].numpy()
+        return logits, value
+
+    def _act(self, *inputs: torch.Tensor) -> torch.Tensor:
+        """Returns logits and value `[K, 7]` of states, each on a plan of its own."""
+        plan, situation = Plan(*inputs[:3]), Situation(*inputs[3:])
+        logits, value = self.network(plan, torch.arange(len(plan.way)), situation)
+        return torch.cat([logits, value[:, None]], dim=1)
+
+
+def _of_one_size(robots: list[Robot]) -> Iterable[list[int]]:
+    """Returns the indices of robots, those whose grids have one size together."""
+    by_size: dict[int, list[int]] = {}
+    for index, robot in enumerate(robots):
+        by_size.setdefault(robot.grid.shape[-1], []).append(index)
+    return by_size.values()

@@ -1,4 +1,4 @@
-"""The learner of policies that plan: PPO from rewards on the last rollout, or imitation of the oracle on several.
+"""The learner of the neural planner: PPO from rewards on the last rollout, or imitation of the oracle on several.
 
 `B` is the number of environments, `R` of steps in all of them together, `G` of grids that these are on.
 """
@@ -31,10 +31,10 @@ _LEAST_RATE = 0.02  # of the learning rate, at the end
 class Rows(NamedTuple):
     """Steps on grids of one size."""
 
-    grids: torch.Tensor  # [G, ..., L, L] uint8
+    grids: torch.Tensor  # [G, 4, L, L] uint8
     grid: torch.Tensor  # [R] int, the grid of each step
     pose: torch.Tensor  # [R, 3], this and the next two as in `Situation`
-    sight: torch.Tensor  # [R, ...]
+    ranges: torch.Tensor  # [R, 32]
     motion: torch.Tensor  # [R, 15]
     action: torch.Tensor  # [R] int
     log_probability: torch.Tensor  # [R], of the action when it was chosen
@@ -149,10 +149,11 @@ class PlannerLearner(NetworkLearner):
         """Returns the loss and its parts."""
         config = self._config
         plan = self.actor.network.plan(rows.grids)
-        logits, value = self.actor.network(plan, rows.grid, Situation(rows.pose, rows.sight, rows.motion))
+        logits, value = self.actor.network(plan, rows.grid, Situation(rows.pose, rows.ranges, rows.motion))
         log_probabilities = functional.log_softmax(logits, dim=1)
         entropy = -(log_probabilities.exp() * log_probabilities).sum(dim=1).mean()
-        scalars = {"entropy": entropy, **self.actor.network.scalars(plan)}
+        wall = plan.wall > 0.5
+        scalars = {"entropy": entropy, "wall_cost": plan.cost[wall].mean(), "free_cost": plan.cost[~wall].mean()}
         if config.teacher == "oracle":
             imitation = -(rows.label * log_probabilities).sum(dim=1).mean()
             right = (logits.argmax(dim=1) == rows.label.argmax(dim=1)).float().mean()

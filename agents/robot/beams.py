@@ -44,6 +44,7 @@ class Beams(NamedTuple):
     random: float  # probability of any reading
     metre: float = 1.0  # cells per metre
     growth: float = 0.0  # of the standard deviation, per square of a range
+    weight: float = 1.0  # of what a ray tells, less than 1 where neighbouring rays share their errors
 
 
 def beams_of(model: LidarModel, cells_per_metre: float) -> Beams:
@@ -116,7 +117,7 @@ def log_likelihood(
             likelihood += passed * wall * _hit_likelihood(reading, distance, across, deviation, beams)
             passed *= 1 - wall
         if not math.isnan(reading):
-            total += math.log(likelihood)
+            total += beams.weight * math.log(likelihood)
         along_x, along_y = along_x * turn_cosine - along_y * turn_sine, along_y * turn_cosine + along_x * turn_sine
     return total
 
@@ -170,9 +171,9 @@ def add_scan(
         # Forwards: `before` is the likelihood of ending before a cell, `passed` the probability of getting to it.
         before, passed = 0.0, 1.0
         for k in range(count):
-            step = math.log((before + passed * hits[k]) / (before + passed * passing[k]))
+            step = beams.weight * math.log((before + passed * hits[k]) / (before + passed * passing[k]))
             if (step > 0 and may_mark[k]) or (step < 0 and may_free[k]):
-                step = min(max(step, -_LARGEST_STEP), _LARGEST_STEP)
+                step = min(max(step, -beams.weight * _LARGEST_STEP), beams.weight * _LARGEST_STEP)
                 changed = evidence[rows[k], columns[k]] + step
                 evidence[rows[k], columns[k]] = min(max(changed, -MOST_EVIDENCE), MOST_EVIDENCE)
             before += passed * walls[k] * hits[k]

@@ -29,10 +29,11 @@ NAME = "camera-ranges"
 _SIZE = 64  # pixels of a picture's side
 _NEAREST = 0.15  # m
 _FARTHEST = MAX_RANGE + 0.5  # m, of what is learned
-_FAR_SCALES = 1.0
-SURE = 0.025  # m, the largest scale of a range that is trusted; chosen on train mazes
+_FAR_SCALES = 3.0  # by which a range is surely farther than `MAX_RANGE`
+SURE = 0.1  # m, the largest scale of a range that is trusted; chosen on train mazes
 # The beam model's: m, the share of rays that read the largest range, or anything, and 1/m.
 _SIGMA, _LOST, _RANDOM, _GROWTH = 0.03, 0.01, 0.05, 0.015
+_WEIGHT = 0.1  # of a ray; chosen on train mazes
 _AT_ONCE = 32  # pictures, always, since PyTorch rounds differently at another batch size
 
 
@@ -109,7 +110,7 @@ class CameraRanges:
     def beams(self, cells_per_metre: float) -> Beams:
         """Returns the beam model of these ranges, whose errors grow with the square of the range."""
         reach, sigma, growth = MAX_RANGE * cells_per_metre, _SIGMA * cells_per_metre, _GROWTH / cells_per_metre
-        return Beams(reach, sigma, _LOST, _RANDOM, cells_per_metre, growth)
+        return Beams(reach, sigma, _LOST, _RANDOM, cells_per_metre, growth, _WEIGHT)
 
     @one_torch_thread()
     def read(self, pictures: np.ndarray, chosen: np.ndarray | None = None) -> np.ndarray:
