@@ -9,15 +9,11 @@ from typing import Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface, Report
-from mazebench.maps.maze import cell_to_point
 
-from ..robot.body import LOOK_LEFT, PLAYED, WITHOUT_STRAFING, as_kind
+from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
-from ..robot.pilot import steer
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, report
-
-_BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
 
 
 @dataclasses.dataclass
@@ -64,20 +60,11 @@ class Navigator(Agent):
                     robot = state[slot] = _Robot(memory)
 
                 # A path over walls and goal as they are estimated now.
-                body = memory.body
                 walls, goal = self.estimate(memory, inputs, slot)
                 path = plan(walls, goal, memory.cell, self._cell_size) if goal.any() else []
 
                 # It drives along the path, and waits where there is none.
-                action, point = LOOK_LEFT, body.rest()
-                if len(path) == 1:
-                    action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), self._strafes)
-                elif path:
-                    blocked = walls > _BLOCKED
-                    blocked[tuple(np.transpose(path))] = False
-                    action, point = robot.drive.next(blocked, path, body, self._cell_size, self._strafes)
-                memory.command(action, point)
-                actions[slot] = action
+                actions[slot] = robot.drive.follow(path, walls, memory, self._strafes)
         return as_kind(self._kind, actions), state
 
     def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
