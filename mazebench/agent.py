@@ -7,6 +7,7 @@ the context's planes.
 from __future__ import annotations
 
 import copy
+import dataclasses
 import functools
 import pathlib
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from mazebench.options import Options
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.interface import Interface as Interface
 
@@ -61,8 +63,21 @@ class Report(NamedTuple):
     notes: Sequence[Any] | None = None  # B values that JSON can hold, each of them perhaps None
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AgentConfig(Options):
+    """Base of an agent's config, a frozen dataclass whose values `mazebench eval --set KEY=VALUE` replaces."""
+
+    def identity(self) -> dict[str, Any]:
+        """Returns what may change results, as values that JSON can hold: by default all fields."""
+        return dataclasses.asdict(self)
+
+
 class _Declarations:
     """Declarations that the class of an agent may make; each has a default."""
+
+    # The defaults of the agent's config. With one, `build` is given two more arguments: `config`, and `folder`, that of
+    # the results, in which the agent may keep files of its own; None if there is none.
+    eval_config: ClassVar[AgentConfig | None] = None
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
     needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them, unless sensors are named
@@ -187,8 +202,8 @@ class _SingleAgents(Agent):
         self._built, self._resting = built, resting  # the agent, and the action where no episode is left
 
     @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        built = cls.single_class.build(interface, seed=seed, checkpoint=checkpoint)
+    def build(cls, interface: Interface, **given: Any) -> Self:
+        built = cls.single_class.build(interface, **given)
         return cls(built, np.zeros(interface.action_shape, dtype=np.int64))
 
     def initial_state(self, batch_size: int) -> list[SingleAgent]:
@@ -227,7 +242,7 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     if issubclass(declared, Agent):
         return declared
     # Named as the class that it wraps, for messages and provenance.
-    declarations = ("needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
+    declarations = ("eval_config", "needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
     names = ("__module__", "__qualname__", "__doc__", *declarations, "context_size", "default_checkpoint")
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

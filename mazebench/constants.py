@@ -12,6 +12,7 @@ TASK_VERSION = 1
 ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times the oracle's steps
 
 EPISODES_PER_DISTANCE = 5  # of an evaluation, in each maze
+FROZEN_PER_MAZE = 5  # episodes of a track
 
 X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in a state, see docs/task.md
 

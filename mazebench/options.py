@@ -17,15 +17,17 @@ import os
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self, TypeVar
 
 import numpy as np
+import pydantic
 from annotated_types import Ge, GroupedMetadata, Le
 from typing_extensions import Doc as Doc
 
 from mazebench.errors import InputError, UnknownOptionError, unknown
 
 _LONGEST = 200  # characters of a message about a value
+Config = TypeVar("Config")
 
 
 class OneOf:
@@ -165,6 +167,50 @@ def _fields_of(options_class: Any) -> Mapping[str, Option]:
             read=next((item.read for item in metadata if isinstance(item, ReadBy)), None),
         )
     return types.MappingProxyType(described)
+
+
+def override(config: Config, values: Mapping[str, Any]) -> Config:
+    """Returns `config`, whose class subclasses `Options`, with some of its values replaced.
+
+    Args:
+      config: unchanged.
+      values: by name; text is converted to the field's type.
+
+    Raises:
+      InputError: if a name is unknown, or a value is not of its field's type or range.
+    """
+    kind: Any = type(config)
+    fields = fields_of(kind)
+    typed: dict[str, Any] = {}
+    for name, value in values.items():
+        if name not in fields:
+            raise unknown("config key", name, fields)
+        try:
+            typed[name] = pydantic.TypeAdapter(fields[name].kind).validate_python(value)
+        except pydantic.ValidationError as error:
+            expected = fields[name].kind_text
+            raise InputError(f"config key {name!r}: expected {expected}, found {str(value)[:80]!r}") from error
+    try:
+        return dataclasses.replace(config, **typed)  # type: ignore[type-var]
+    except InputError as error:
+        raise InputError(f"config: {error}") from error
+
+
+def _read_overrides(values: Mapping[str, Any] | Iterable[str] | None) -> dict[str, str]:
+    """Returns values of an agent's config as text, by name: from a mapping, from texts KEY=VALUE, or none."""
+    if isinstance(values, Mapping):
+        return {name: str(value) for name, value in values.items()}
+    read = {}
+    for text in values or ():
+        key, equals, value = text.partition("=")
+        if not equals or not key:
+            raise InputError(f"expected --set KEY=VALUE, found {text!r}")
+        read[key.strip()] = value.strip()
+    return read
+
+
+# The type of a field `overrides`, which the command line has as --set.
+Overrides = Annotated[Mapping[str, str], ReadBy(_read_overrides), Doc("A value of the agent's config; repeatable.")]
 
 
 def options_in(values: Mapping[str, Any], options_class: type) -> dict[str, Any]:

@@ -1,11 +1,11 @@
 """Configs of the learning agents: a key or value that is not allowed is refused."""
 
 import pytest
-from mazebench_agents.common.config_values import override
 from mazebench_agents.dqn.dqn_config import DQNConfig
 from mazebench_agents.mmn.mmn_config import MMNConfig
 
 from mazebench.errors import InputError
+from mazebench.options import override
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,7 @@ class TestRefused:
         ("agents", "options", "said"),
         [
             (["nobody"], {}, "unknown agent 'nobody'"),
-            (["mah", "dqn"], {"checkpoint": "x"}, "expected one agent with --checkpoint, found 2"),
+            (["mah", "dqn"], {"checkpoint": "x"}, "expected one agent with --checkpoint or --set, found 2"),
             (["random"], {"checkpoint": "x"}, "agent 'random' reads no checkpoint"),
         ],
     )

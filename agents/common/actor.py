@@ -15,11 +15,11 @@ import torch
 from mazebench.agent import Interface
 from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import UnplayableError
+from mazebench.options import override
 from mazebench.tasks.task import Task
 from mazebench.training.protocol import Learner, LearningAgent
 
 from .checkpoint import load_agent, load_checkpoint, load_into, save_checkpoint
-from .config_values import override
 
 
 @contextlib.contextmanager

@@ -13,10 +13,9 @@ import torch
 
 from mazebench.errors import InputError, shortened
 from mazebench.maps.file_kinds import kind_of, way_out
+from mazebench.options import Config, override
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
-
-from .config_values import Config, override
 
 FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"

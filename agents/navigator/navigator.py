@@ -9,16 +9,12 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface, Report
-from mazebench.maps.maze import cell_to_point
 
-from ..robot.body import LOOK_LEFT, LOOK_RIGHT, PLAYED, TURN_STEP, WITHOUT_STRAFING, as_kind
+from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
-from ..robot.facing import as_if_turned, driven_while_turning, turn_along
-from ..robot.pilot import steer
+from ..robot.facing import TurningDrive
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, report
-
-_BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
 
 
 @dataclasses.dataclass
@@ -26,7 +22,7 @@ class _Robot:
     """The robot in one environment: what it knows, and the drive that is under way."""
 
     memory: Memory
-    heading: float  # rad, with which it plans its drives where it turns as it drives
+    turning: TurningDrive
     drive: Drive = dataclasses.field(default_factory=Drive)
 
 
@@ -61,35 +57,23 @@ class Navigator(Agent):
     ) -> tuple[np.ndarray, list[_Robot | None]]:
         """Returns actions `[B]`, for one environment after the other."""
         actions = np.zeros(len(state), dtype=np.int64)
-        velocities = np.zeros((len(state), 3))
+        velocities = np.zeros((len(state), 3))  # of robots that turn as they drive
         inputs = self._senses.look(inputs)
         for slot, robot in enumerate(state):
             if inputs.active is None or inputs.active[slot]:
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
-                    robot = state[slot] = _Robot(memory, memory.body.yaw)
+                    robot = state[slot] = _Robot(memory, TurningDrive(memory.body.yaw))
 
                 # A path over walls and goal as they are estimated now.
-                body = as_if_turned(memory.body, robot.heading) if self._turns else memory.body
                 walls, goal = self.estimate(memory, inputs, slot)
                 path = plan(walls, goal, memory.cell, self._cell_size) if goal.any() else []
 
                 # It drives along the path, and waits where there is none.
-                action, point = LOOK_LEFT, body.rest()
-                if len(path) == 1:
-                    action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), self._strafes)
-                elif path:
-                    blocked = walls > _BLOCKED
-                    blocked[tuple(np.transpose(path))] = False
-                    action, point = robot.drive.next(blocked, path, body, self._cell_size, self._strafes)
                 if self._turns:
-                    turn = turn_along(path, memory.body, len(walls))
-                    velocities[slot] = driven_while_turning(memory.body, robot.heading, action, turn)
-                    memory.command(action, point, robot.heading, turn)
-                    robot.heading += TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
+                    velocities[slot] = robot.turning.follow(path, walls, memory)
                 else:
-                    memory.command(action, point)
-                actions[slot] = action
+                    actions[slot] = robot.drive.follow(path, walls, memory, self._strafes)
         return velocities if self._turns else as_kind(self._kind, actions), state
 
     def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:

@@ -60,6 +60,11 @@ class Body(NamedTuple):
         cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
         return cosine * self.forward - sine * self.left, sine * self.forward + cosine * self.left
 
+    def turned(self, heading: float) -> Body:
+        """Returns the body as if it had another heading (rad), with the velocity on the map that it has."""
+        (x, y), cosine, sine = self.velocity(), math.cos(heading), math.sin(heading)
+        return Body(self.x, self.y, heading, cosine * x + sine * y, cosine * y - sine * x)
+
     def rest(self) -> Point:
         """Returns the point (x, y) at which the body comes to rest if it is let go now."""
         velocity_x, velocity_y = self.velocity()

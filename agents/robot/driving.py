@@ -12,10 +12,12 @@ import math
 import numpy as np
 
 from mazebench.constants import TOP_SPEED
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, cell_to_point
 
-from .body import Body, Point
+from .body import LOOK_LEFT, Body, Point
+from .pilot import steer
 from .quickest import make_course, quickest_drive
+from .senses import Memory
 
 _WAY_AHEAD = 7.0  # m of the path
 _STEPS_AHEAD = 7  # that are planned
@@ -24,6 +26,7 @@ _STEPS_USED = 4  # of them
 _WIDTH = 4  # of the beam, for each heading
 _INSIDE = 0.05  # share of a cell, from the edges of the one that the body is in
 _FASTEST = 1.1 * TOP_SPEED  # m/s; more is an error of the observation
+_BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
 _MOST_OFF = 0.08  # m from where the body should be, before the drive is planned anew
 
 
@@ -34,6 +37,24 @@ class Drive:
     actions: list[int] = dataclasses.field(default_factory=list)
     points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins, m
     path: list[Cell] = dataclasses.field(default_factory=list)  # the cells ahead when it was planned
+
+    def follow(self, path: list[Cell], walls: np.ndarray, memory: Memory, strafes: bool) -> int:
+        """Returns the next action along `path`, around likely `walls` `[L, L]` float; a turn where there is no path."""
+        action, point = self.planned(path, walls, memory.body, memory.cell_size, strafes)
+        memory.command(action, point)
+        return action
+
+    def planned(
+        self, path: list[Cell], walls: np.ndarray, body: Body, cell_size: float, strafes: bool = True
+    ) -> tuple[int, Point]:
+        """Returns that action, and the point (x, y) that it should bring the body to."""
+        if len(path) == 1:
+            return steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), strafes), body.rest()
+        if not path:
+            return LOOK_LEFT, body.rest()
+        blocked = walls > _BLOCKED
+        blocked[tuple(np.transpose(path))] = False
+        return self.next(blocked, path, body, cell_size, strafes)
 
     def next(
         self, blocked: np.ndarray, path: list[Cell], body: Body, cell_size: float, strafes: bool = True

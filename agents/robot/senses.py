@@ -23,7 +23,6 @@ from .body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, Point, observed_body
 from .cells import marked_cell, nearest_cell
 from .contacts import felt_walls
 from .dead_reckoning import DeadReckoning
-from .facing import as_if_turned
 from .map_matching import MapBelief
 from .map_reading import read_map
 from .occupancy import SURE, posterior, seen_walls
@@ -213,7 +212,7 @@ class Senses:
         if self.feels:
             off, size = memory.deviation, len(memory.searched)
             if memory.heading is not None:
-                before = as_if_turned(before, memory.heading)
+                before = before.turned(memory.heading)
             for cell, log_odds in felt_walls(before, memory.action, body, self._cell_size, off, size):
                 memory.evidence[cell] = min(memory.evidence[cell] + log_odds, MOST_EVIDENCE)
 

@@ -11,13 +11,13 @@ from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EPISODES, EvalOptions, RunOptions
 from mazebench.options import options_in
 from mazebench.tasks.task_options import TaskOptions
 
 _WITHOUT = (
     *("resume", "record", "workers", "ray", "ray_address"),  # one process collects all
-    *("episodes_per_distance", "num_goals", "context_size", "reward"),  # as in evaluations, which agents play
+    *(*EPISODES, "num_goals", "context_size", "reward"),  # as in evaluations, which agents play
 )
 
 

@@ -15,7 +15,7 @@ from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EPISODES, EvalOptions, RunOptions
 from mazebench.options import fields_of, options_in
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
@@ -37,7 +37,7 @@ def evaluate(
             "at all levels; tracks-dev, in the mazes to choose agents by; tracks-no-map, with the map hidden; "
             "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
             "tracks-camera and tracks-camera-dev, by camera alone; tracks-goals and tracks-goals-dev, three goals in "
-            "a row where doors have moved."
+            "a row where doors have moved; llm and llm-dev, a few episodes, for agents whose answers cost."
         ),
     ] = None,
     out: Annotated[
@@ -53,7 +53,7 @@ def evaluate(
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
     if suite is not None:
-        own = (*fields_of(TaskOptions), "episodes_per_distance")
+        own = (*fields_of(TaskOptions), *EPISODES)
         if named := [name for name in values if name in own]:
             raise InputError(f"the suite {suite!r} has evaluations of its own; found --{named[0].replace('_', '-')}")
     run = RunOptions(**options_in(values, RunOptions))
@@ -87,9 +87,8 @@ def evaluate(
                 if suite is None:
                     summaries = [run_evaluation(options, folder, run, show)]
                 else:
-                    summaries = run_suite(
-                        suite, agents, folder, run, show, checkpoint=options.checkpoint, seed=options.seed
-                    )
+                    chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
+                    summaries = run_suite(suite, agents, folder, run, show, **chosen)
             if suite is None:
                 print_summary(summaries[0])
             else:

@@ -91,8 +91,10 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
     elif option.choices:
         choice: Any = enum.StrEnum(name, {each: each for each in option.choices})  # type: ignore[misc]  # as typer wants
         kind, default = (choice | None, None) if default is None else (choice, choice(default))
+    elif name == "overrides":
+        kind, default, metavar = list[str], [], "KEY=VALUE"
     elif name in ("mazes", "shown"):  # in Python also values, on the command line a path
         kind = str | None
-    flags = ("--task", "--track") if name == "task" else ()
+    flags = {"task": ("--task", "--track"), "overrides": ("--set",)}.get(name, ())
     annotation = Annotated[kind, typer.Option(*flags, help=option.help, metavar=metavar)]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

@@ -9,7 +9,7 @@ import typer
 
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options, watched_task
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.options import options_in
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
@@ -17,7 +17,7 @@ from mazebench.tasks.task_options import TaskOptions
 _DRAWN = ("map", "lidar", "depth", "labels")  # views that need no rendering, and those of the sensors
 
 
-@takes_options(TaskOptions, EvalOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", "episodes_per_distance"])
+@takes_options(TaskOptions, EvalOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", *EPISODES])
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],

@@ -11,7 +11,6 @@ from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options
-from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
 from mazebench.options import options_in
 from mazebench.tasks.task_options import LOCAL, TaskOptions
@@ -30,21 +29,11 @@ def train(
         typer.Option(help="The run folder; runs/AGENT-[KINDS-]SIZE-SEED or runs/AGENT-TRACK-LEVEL-SEED if not given."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")] = False,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="A value of the agent's config; repeatable."),
-    ] = None,
 ) -> None:
     """Train an agent, on the benchmark's training mazes or others; evaluated on held-out mazes of the same kinds."""
     load_mujoco(renders=False)
     from mazebench.training import loop, run_folder
 
-    parsed = {}
-    for text in overrides or []:
-        key, equals, value = text.partition("=")
-        if not equals or not key:
-            raise InputError(f"expected --set KEY=VALUE, found {text!r}")
-        parsed[key.strip()] = value.strip()
     options = TrainOptions(agent=agent, **options_in(values, TrainOptions))
     folder = out or pathlib.Path("runs") / _folder_name(options, values)
 
@@ -58,7 +47,7 @@ def train(
     with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
         task_options = {name: value for name, value in options_in(values, TaskOptions).items() if name != "task"}
         asked = TaskOptions(task=options.task[0], **task_options)
-        loop.run_training(options, asked, folder, resume, show, parsed)
+        loop.run_training(options, asked, folder, resume, show)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 

@@ -9,6 +9,7 @@ import collections
 import contextlib
 import dataclasses
 import functools
+import pathlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -65,10 +66,12 @@ class Chunk:
     record: bool  # whether trajectories are wanted
     num_envs: int  # environments side by side
     num_threads: int  # of the simulation; 0 for all cores
+    folder: pathlib.Path | None = None  # of the results
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Leaves out the class, which may have been made of a `SingleAgent`: a worker loads it by its name."""
-        return _unpickled, (self.options, self.task, self.trials, self.record, self.num_envs, self.num_threads)
+        how = self.record, self.num_envs, self.num_threads, self.folder
+        return _unpickled, (self.options, self.task, self.trials, *how)
 
 
 def _unpickled(options: EvalOptions, task: Task, *others: Any) -> Chunk:
@@ -84,7 +87,7 @@ def _shared(task: Task) -> Task:
 def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
     """Yields the results of the episodes that ended, after each step; each once, in no fixed order."""
     for results in run_trials(
-        build_agent(chunk.options, chunk.task, chunk.agent_class),
+        build_agent(chunk.options, chunk.task, chunk.agent_class, chunk.folder),
         chunk.task,
         chunk.trials,
         chunk.num_envs,

@@ -7,11 +7,12 @@ from typing import Annotated, Any
 
 from annotated_types import Ge, Interval
 
-from mazebench.constants import EPISODES_PER_DISTANCE
-from mazebench.options import Doc, Options, options_in
+from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
+from mazebench.options import Doc, Options, Overrides, options_in
 from mazebench.tasks.task import Task, as_options
 from mazebench.tasks.task_options import TaskOptions
 
+EPISODES = ("episodes_per_distance", "episodes_per_maze")  # fields that say how many episodes there are
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 
 
@@ -33,12 +34,16 @@ class EvalOptions(Options):
             "of a track are all played; in mazes of your own, a track has 48 episodes a maze if not given."
         ),
     ] = None
+    episodes_per_maze: Annotated[
+        int, Interval(ge=1, le=FROZEN_PER_MAZE), Doc("Of a track's frozen episodes, so many in each maze.")
+    ] = FROZEN_PER_MAZE
     checkpoint: Annotated[
         str | None, Doc("A learned agent's checkpoint or run folder; the shipped one if not given.")
     ] = None
     seed: Annotated[
         int, Interval(ge=0, le=2**53 - 1), Doc("Seed of what the agent draws, and of episodes that are not frozen.")
     ] = 0
+    overrides: Overrides = dataclasses.field(default_factory=dict)
 
 
 def eval_options(agent: str, task: str | Task | TaskOptions = "local", **options: Any) -> EvalOptions:

@@ -55,8 +55,8 @@ def evaluate(
       out: the folder for records, summary and options; None keeps the summary alone.
       progress: called as episodes end, with their number and that of all.
       **options: by name, as docs/options.md and docs/evaluate.md list them: those of the evaluation (`EvalOptions`:
-        episodes_per_distance, checkpoint, seed), of its run (`RunOptions`: resume, record, num_envs, workers, ray,
-        ray_address), and those of `Task.of`, unless `task` is a `Task`.
+        episodes_per_distance, checkpoint, seed, overrides, ...), of its run (`RunOptions`: resume, record, num_envs,
+        workers, ray, ray_address), and those of `Task.of`, unless `task` is a `Task`.
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.
@@ -132,6 +132,7 @@ def run_plan(
             task=plan.task.options,
             privileged=plan.agent_class.needs_truth,
             untrained_scale=plan.untrained_scale,
+            config=plan.chosen_config,
             suite=suite,
             part=part,
             benchmark=plan.task.options.benchmark,
@@ -160,6 +161,7 @@ def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:
             store.record,
             num_envs,
             pool.num_threads,
+            store.folder,
         )
         for first in range(num_chunks)
     ]

@@ -10,14 +10,15 @@ import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from mazebench.agent import Agent
+from mazebench.agent import Agent, AgentConfig
 from mazebench.agent_loading import load_agent_class
-from mazebench.constants import EPISODES_PER_DISTANCE
+from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
+from mazebench.options import override
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.sensors import LIDAR
@@ -52,6 +53,13 @@ class Plan:
     def untrained_scale(self) -> bool:
         """True if the agent learned on maps of another scale, in metres per cell of the context."""
         return self._learned_scale not in (None, self._scale)
+
+    @property
+    def chosen_config(self) -> dict[str, Any]:
+        """The values of the agent's config that are not the default ones and may change results."""
+        configs = config_of(self.options, self.agent_class), self.agent_class.eval_config
+        chosen, usual = (config.identity() if config else {} for config in configs)
+        return {name: value for name, value in chosen.items() if value != usual[name]}
 
     @property
     def remark(self) -> str | None:
@@ -94,8 +102,21 @@ class Plan:
         return None
 
 
-def build_agent(options: EvalOptions, task: Task, agent_class: type[Agent]) -> CheckedAgent:
+def config_of(options: EvalOptions, agent_class: type[Agent]) -> AgentConfig | None:
+    """Returns the agent's config with the values that were asked for; None if its class declares none."""
+    if agent_class.eval_config is not None:
+        return override(agent_class.eval_config, options.overrides)
+    if options.overrides:
+        raise InputError(f"agent {options.agent!r}: has no config in evaluations, found --set {min(options.overrides)}")
+    return None
+
+
+def build_agent(
+    options: EvalOptions, task: Task, agent_class: type[Agent], folder: pathlib.Path | None = None
+) -> CheckedAgent:
     """Returns a new agent of a plan, for its task, held to its contract.
+
+    `folder` is where an agent with a config may keep files of its own.
 
     Raises:
       InputError: if the agent can't use its checkpoint.
@@ -118,8 +139,10 @@ def build_agent(options: EvalOptions, task: Task, agent_class: type[Agent]) -> C
         raise UnplayableError(
             f"agent {options.agent!r}: plays the actions {', '.join(plays)}, found {interface.actions}"
         )
+    config = config_of(options, agent_class)
+    more: dict[str, Any] = {} if config is None else {"config": config, "folder": folder}
     with calling(options.agent, "build"):
-        agent = agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
+        agent = agent_class.build(interface, seed=options.seed, checkpoint=checkpoint, **more)
     if not isinstance(agent, Agent):
         raise AgentError(f"agent {options.agent!r}: expected an Agent from build(), found {type(agent).__name__}")
     return CheckedAgent(options.agent, agent, interface.actions)
@@ -144,14 +167,14 @@ def make_plan(
     """
     agent_class = agent_class or load_agent_class(options.agent)
     task = task_as_played(options.agent, agent_class, options.task, resolver)
-    options = _with_checkpoint(options, agent_class)
+    options, config = _with_checkpoint(options, agent_class), config_of(options, agent_class)
     if task.track is None or task.options.mazes is None:
         options = options.replace(episodes_per_distance=options.episodes_per_distance or EPISODES_PER_DISTANCE)
     if ":" in options.agent:  # modules that it imports when it is built are part of its code
         with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
             build_agent(options, task, agent_class)
     if trials is None:
-        trials = select_trials(task, options.episodes_per_distance, options.seed)
+        trials = select_trials(task, options.episodes_per_distance, options.seed, options.episodes_per_maze)
     origin = provenance(options, task, agent_class)
     world = largest_spec(task.mazes[0])  # the hash of the mazes tells the walls, too
     identity = {
@@ -160,6 +183,8 @@ def make_plan(
         "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart, as it does older maps
         **({} if task.options.shown is None else {"shown": "own"}),
         "episodes_per_distance": options.episodes_per_distance,
+        **({"episodes_per_maze": per_maze} if (per_maze := options.episodes_per_maze) < FROZEN_PER_MAZE else {}),
+        **({} if config is None else {"config": config.identity()}),
         "seed": options.seed,
         **{name: getattr(origin, name) for name in _IDENTIFYING},
         "mujoco": origin.packages.get("mujoco"),

@@ -178,9 +178,11 @@ class Store:
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         with contextlib.suppress(OSError):  # of a line that could not be written, which was reported
             self._journal.close()
-        # A run that the agent can't play leaves nothing; one that was stopped keeps its config.
+        # A run that the agent can't play leaves nothing. One that was stopped keeps its config, and so does one in
+        # which the agent keeps files.
         if self._is_new and not self._ended and kind is not None and issubclass(kind, InputError | AgentError):
             with contextlib.suppress(OSError):
-                for name in (JOURNAL, CONFIG):
-                    (self.folder / name).unlink(missing_ok=True)
-                self.folder.rmdir()
+                if {path.name for path in self.folder.iterdir()} <= {JOURNAL, CONFIG}:
+                    for name in (JOURNAL, CONFIG):
+                        (self.folder / name).unlink(missing_ok=True)
+                    self.folder.rmdir()

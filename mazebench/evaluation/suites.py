@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mazebench.agent import Interface
-from mazebench.constants import EPISODES_PER_DISTANCE
+from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress, run_plan
@@ -39,6 +39,7 @@ class Part:
     name: str
     task: TaskOptions
     episodes_per_distance: int = EPISODES_PER_DISTANCE
+    episodes_per_maze: int = FROZEN_PER_MAZE
 
 
 def _hierarchical(name: str, **options: Any) -> Part:
@@ -47,6 +48,14 @@ def _hierarchical(name: str, **options: Any) -> Part:
 
 def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, episodes: int = 5, **options: Any) -> Part:
     return Part(name, TaskOptions(distances=distances, **options), episodes)
+
+
+def _in_words(**options: Any) -> tuple[Part, ...]:
+    """Returns parts with an episode in each maze, for agents whose answers cost; their names differ from all others."""
+    return tuple(
+        Part(f"{track}-{level}-words", TaskOptions(task=track, level=(level,), **options), episodes_per_maze=1)
+        for track, level in (("building", 1), ("rebuilt", 2), ("adrift", 1), ("adrift", 2))
+    )
 
 
 def _each_level(tracks: Iterable[str] = TRACKS, suffix: str = "", **options: Any) -> tuple[Part, ...]:
@@ -86,6 +95,8 @@ SUITES: dict[str, tuple[Part, ...]] = {
     # Goals in a row on one wrong map; parts have names of their own, since their first goals are played on the tracks.
     "tracks-goals": _each_level(("rebuilt",), "-goals", num_goals=3),
     "tracks-goals-dev": _each_level(("rebuilt",), "-goals", num_goals=3, split=DEV),
+    "llm": _in_words(),
+    "llm-dev": _in_words(split=DEV),
 }
 
 
@@ -98,6 +109,7 @@ def run_suite(
     *,
     checkpoint: str | None = None,
     seed: int = 0,
+    overrides: Mapping[str, str] | None = None,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -111,26 +123,29 @@ def run_suite(
       progress: called as episodes end, with their number and that of all parts together.
       checkpoint: of a single agent.
       seed: of what the agents draw.
+      overrides: values of the config of a single agent.
 
     Raises:
-      InputError: if a name is unknown, an agent named twice, a checkpoint given to several agents, or the folder holds
-        something else.
+      InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
+        folder holds something else.
       UnplayableError: if an agent can play no part.
       RunError: if an agent or a worker failed; what ended until then is kept.
     """
     if suite not in SUITES:
         raise unknown("suite", suite, SUITES)
     out = out.absolute()  # agents may change the working folder
-    if checkpoint is not None and len(agents) > 1:
-        raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
+    if (checkpoint is not None or overrides) and len(agents) > 1:
+        raise InputError(f"expected one agent with --checkpoint or --set, found {len(agents)}")
     plans = {
         (folder, part.name): make_plan(
             EvalOptions(
                 agent=agent,
                 task=part.task,
                 episodes_per_distance=part.episodes_per_distance,
+                episodes_per_maze=part.episodes_per_maze,
                 checkpoint=checkpoint,
                 seed=seed,
+                overrides=overrides or {},
             )
         )
         for agent, folder in _folders(agents).items()

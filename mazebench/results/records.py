@@ -130,6 +130,7 @@ class Summary(_Stored):
     agent: Name
     privileged: bool  # whether the agent was given the true maze and pose
     untrained_scale: bool = False  # whether the agent learned on maps of another scale, in metres a cell of the context
+    config: dict[str, Any] = {}  # values of the agent's config that are not the default ones and may change results
     task: StoredTask  # as this agent played it
     suite: Name | None = None  # of a part of a suite, with the part's name
     part: Name | None = None
@@ -149,14 +150,15 @@ class Summary(_Stored):
     def row(self) -> str:
         """The agent with what sets its result apart, except for privileges: "navigator without map".
 
-        These are its actions unless it has the six, its sensors unless they are the task's own (the lidar on a track),
-        and what it was told less or more.
+        These are values of its config, its actions unless it has the six, its sensors unless they are the task's own
+        (the lidar on a track), and what it was told less or more.
         """
+        config = "".join(f" {name}={value}" for name, value in self.config.items())
         acting = "" if self.task.actions in (None, "six") else f" with {self.task.actions} actions"
         sensors = self.task.sensors_in_words
         acting += "" if sensors == (LIDAR if self.task.track else "") else f" with {sensors}"
         without = f" without {' and '.join(self.task.hide)}" if self.task.hide else ""
-        return self.agent + acting + without + (" with the true pose" if self.task.exact_pose else "")
+        return self.agent + config + acting + without + (" with the true pose" if self.task.exact_pose else "")
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""

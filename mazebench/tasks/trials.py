@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mazebench.constants import EPISODES_PER_DISTANCE
+from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.maps.benchmark import (
     GOALS_BENCHMARK,
     KINDS_SIZE,
@@ -88,7 +88,12 @@ def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split:
     return tuple(trials)
 
 
-def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+def select_trials(
+    task: Task,
+    episodes_per_distance: int | None = EPISODES_PER_DISTANCE,
+    seed: int = 0,
+    episodes_per_maze: int = FROZEN_PER_MAZE,
+) -> list[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
     In the benchmark's mazes its frozen episodes are taken as far as they go: of a track all of the task's distances,
@@ -98,6 +103,7 @@ def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_D
       task: the task; its distances are those of the pairs.
       episodes_per_distance: for each maze and distance; None for 48 in each maze, spread over the distances.
       seed: of what is drawn.
+      episodes_per_maze: of the frozen ones of a track, beginning in maze k with number k modulo 5.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
@@ -109,8 +115,8 @@ def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_D
         later = frozen_legs(frozen_split, trials) if are_frozen else [()] * len(trials)
         return [
             with_later_legs(task, trial, legs)
-            for trial, legs in zip(trials, later, strict=True)
-            if trial.distance in task.distances
+            for index, (trial, legs) in enumerate(zip(trials, later, strict=True))
+            if trial.distance in task.distances and (index - trial.episode.maze) % FROZEN_PER_MAZE < episodes_per_maze
         ]
     if frozen_split is not None and task.options.is_hierarchical:
         return list(frozen_trials(task.name, task.size))

@@ -79,7 +79,6 @@ def train(
     task: str | Sequence[str] | Task | TaskOptions = "local",
     *,
     out: str | pathlib.Path,
-    overrides: Mapping[str, Any] | None = None,
     resume: bool = False,
     progress: Progress = lambda status: None,
     **options: Any,
@@ -96,11 +95,10 @@ def train(
       task: "local", the name of a track, or the names of several, of which each episode draws one; or a
         `Task`, of which counts what was asked.
       out: the run folder.
-      overrides: values of the agent's config by name.
       resume: go on from the last checkpoint in `out`.
       progress: called with the status after each step.
       **options: by name, as docs/options.md and docs/training.md list them: those of the training (`TrainOptions`:
-        minutes, env_steps, seed, checkpoint_steps, ...), and those of `Task.of`, unless `task` is a `Task`.
+        minutes, env_steps, seed, checkpoint_steps, overrides, ...), and those of `Task.of`, unless `task` is a `Task`.
 
     Raises:
       InputError: if an option is wrong, or `out` can't be used.
@@ -112,7 +110,7 @@ def train(
     names: Sequence[str] = (task,) if isinstance(task, str) else task if isinstance(task, Sequence) else ()
     asked = as_options(names[0] if names else task, of_task)  # type: ignore[arg-type]
     chosen = TrainOptions.of(of_training, agent=agent, task=tuple(names) or (asked.task,))
-    run_training(chosen, asked, pathlib.Path(out), resume, progress, overrides)
+    run_training(chosen, asked, pathlib.Path(out), resume, progress)
 
 
 def run_training(
@@ -121,7 +119,6 @@ def run_training(
     out: pathlib.Path,
     resume: bool = False,
     progress: Progress = lambda status: None,
-    overrides: Mapping[str, Any] | None = None,
 ) -> None:
     """Trains an agent in the tasks that `options` name, as `asked` says."""
     agent_class = load_agent_class(options.agent)
@@ -131,17 +128,16 @@ def run_training(
             with contextlib.suppress(InputError):  # of one whose dependencies are not installed
                 learning += [name] if issubclass(load_agent_class(name), LearningAgent) else []
         raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning)}")
-    overrides = {name: str(value) for name, value in (overrides or {}).items()}
     if len(options.task) > 1 and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.task)}")
-    defaults = agent_class.task_options(overrides)
+    defaults = agent_class.task_options(options.overrides)
     tasks = tuple(
         training_task(options.agent, agent_class, defaults, asked.replace(task=name)) for name in options.task
     )
     _check_together(options, tasks)
     held_out = [HeldOutEvaluation(task, options.eval_mazes, asked.distances or ()) for task in tasks]
     tasks = in_the_same_mazes(tasks)
-    learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
+    learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=options.overrides)
     with RunFolder(out) as folder:
         # The first checkpoint of a new run is saved, or the last one is loaded.
         saved, counters = checkpoints(out), Counters()

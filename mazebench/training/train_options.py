@@ -8,7 +8,7 @@ from typing import Annotated
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.options import Doc, OneOf, Options
+from mazebench.options import Doc, OneOf, Options, Overrides
 from mazebench.tasks.task_options import LOCAL
 from mazebench.tasks.tracks import TRACKS
 
@@ -55,6 +55,7 @@ class TrainOptions(Options):
     widen_steps: Annotated[
         int, Ge(1), Doc("Agent steps over which that grows to the farthest distance of the task.")
     ] = 400_000
+    overrides: Overrides = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
