@@ -46,6 +46,8 @@ def rays_in_view(fov: float) -> np.ndarray:
 class RangeNetwork(nn.Module):
     """Convolutions of a picture, first towards its columns, then along them."""
 
+    places: torch.Tensor  # [1, 2, 64, 64]
+
     def __init__(self, num_rays: int):
         """Reads pictures of 64 x 64 pixels."""
         super().__init__()

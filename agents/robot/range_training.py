@@ -72,7 +72,7 @@ class Pictures:
         marker = np.where(rng.random((count, 1)) < _MARKED, marker, -10.0)
         gain, noise_at = np.ones(count, np.float32), np.full(count, -1)
         if look == VARIED:
-            gain = np.exp(rng.uniform(*np.log(EXPOSURES), count)).astype(np.float32)
+            gain = np.exp(rng.uniform(math.log(EXPOSURES[0]), math.log(EXPOSURES[1]), count)).astype(np.float32)
             noise_at = rng.integers(NUM_NOISE, size=count)
         marker = np.column_stack([marker, np.zeros(count)])
         pictures = self._cameras[look].take(("egocentric",), maze, pose, marker, gain, noise_at)["egocentric"]
@@ -104,7 +104,9 @@ def other_patterns(rng: np.random.Generator) -> np.ndarray:
         drawn = []
         for number in chosen:
             parts = [whole[number], whole[rng.choice(chosen)]]
-            turned = [np.roll(np.rot90(part, rng.integers(4)), rng.integers(TEXELS, size=2), (0, 1)) for part in parts]
+            turned = [
+                np.roll(np.rot90(part, int(rng.integers(4))), rng.integers(TEXELS, size=2), (0, 1)) for part in parts
+            ]
             share = rng.choice([0.0, rng.uniform(0, 0.5)])
             mixed = (1 - share) * turned[0] + share * turned[1]
             drawn.append((mixed if rng.random() < 0.5 else 255 - mixed) * rng.uniform(0.5, 1))
