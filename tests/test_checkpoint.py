@@ -73,9 +73,12 @@ def test_missing_checkpoint_is_refused(tmp_path):
         MAH.build(INTERFACE, checkpoint=tmp_path / "none")
 
 
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / "assets" / "checkpoints").glob("*.safetensors")), ids=lambda path: path.stem
-)
+@pytest.mark.parametrize(  # an agent's checkpoint has its config beside it
+    "path",
+    [path.with_name(path.name.replace(".config.json", ".safetensors"))
+     for path in sorted((ROOT / "assets" / "checkpoints").glob("*.config.json"))],
+    ids=lambda path: path.stem,
+)  # fmt: skip
 def test_the_page_of_shipped_checkpoints_says_what_their_files_say(path):
     tensors, metadata = load_checkpoint(path, path.stem.rpartition("-")[0])
     parameters = sum(tensor.numel() for tensor in tensors.values())

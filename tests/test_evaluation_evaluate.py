@@ -167,10 +167,8 @@ class TestAgents:
     @pytest.mark.parametrize("agent", [Witness, "navigator", "neural-planner"])
     def test_an_agent_without_the_sensor_that_it_needs_is_refused(self, agent, monkeypatch):
         monkeypatch.setattr(Witness, "needs_sensors", ("lidar",))
-        with pytest.raises(
-            UnplayableError, match="expected the sensor lidar, found egocentric; add it: --sensors lidar"
-        ):
-            evaluate(agent, "building", sensors="egocentric")
+        with pytest.raises(UnplayableError, match="expected the sensor lidar, found depth; add it: --sensors lidar"):
+            evaluate(agent, "building", sensors="depth")
 
 
 class TestSeeds:

@@ -22,8 +22,11 @@ class _Robot:
     """The robot in one environment: what it knows, and the drive that is under way."""
 
     memory: Memory
-    turning: TurningDrive
     drive: Drive = dataclasses.field(default_factory=Drive)
+    turning: TurningDrive = dataclasses.field(init=False)
+
+    def __post_init__(self) -> None:
+        self.turning = TurningDrive(self.memory.body.yaw)
 
 
 class Navigator(Agent):
@@ -63,7 +66,7 @@ class Navigator(Agent):
             if inputs.active is None or inputs.active[slot]:
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
-                    robot = state[slot] = _Robot(memory, TurningDrive(memory.body.yaw))
+                    robot = state[slot] = _Robot(memory)
 
                 # A path over walls and goal as they are estimated now.
                 walls, goal = self.estimate(memory, inputs, slot)
