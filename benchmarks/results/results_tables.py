@@ -123,6 +123,7 @@ _ROWS = {
     "neural-planner from rewards": "`neural-planner`, learned from rewards",
     "dagger:Student": "90-second student of the oracle, reads distances on the map",
     "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map, progress reward",
+    "sb3_agent:FieldRecurrentPPOAgent": "the same with an LSTM, one run",
     "planner-closed-loop": "`planner-closed-loop`, follows the map",
     "sb3_agent:PPOAgent": "PPO, reads the raw map, sparse reward, one run",
     "sb3_agent:RecurrentPPOAgent": "PPO with an LSTM, reads the raw map, sparse reward, one run",
