@@ -1,4 +1,4 @@
-"""How wide a robot sees: the navigator with the lidar's rays that lie in a camera's view.
+"""A narrower view: the navigator with the lidar's rays that lie in a camera's view.
 
 mazebench eval --agent benchmarks.views:NarrowNavigator --track rebuilt --level 2 --split dev --actions velocity
 """

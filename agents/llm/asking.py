@@ -1,4 +1,4 @@
-"""Who is asked: a service with the chat API of OpenAI, a person, or a script; and `show:K`, which writes a question."""
+"""Asks a service with the chat API of OpenAI, a person or a script; `show:K` writes a question instead."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _FAULTS = (OSError, http.client.HTTPException, ValueError, LookupError, TypeErro
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class LLMConfig(AgentConfig):
-    """What is asked, and of whom."""
+    """The question, and the one who is asked."""
 
     model: str = ""  # as the service calls it; or person:NAME, script:NAME, or show:K, which writes the Kth question
     mode: Annotated[str, OneOf("notice", "told")] = "notice"  # whether it must see what differs, or is told

@@ -93,10 +93,9 @@ class RangeNetwork(nn.Module):
 class CameraRanges:
     """Ranges by the network that ships for a camera."""
 
-    def __init__(self, camera: Camera, agent: str, file: pathlib.Path | None = None):
-        """Reads the network, by default the one that ships; raises `UnplayableError` if none was trained for it."""
-        expected = Camera(_SIZE, camera.fov)
-        if camera != expected or (file is None and camera.fov not in SHIPPED):
+    def __init__(self, camera: Camera, agent: str):
+        """Reads the network; raises `UnplayableError`, in the name of `agent`, if none ships for the camera."""
+        if camera != Camera(_SIZE, camera.fov) or camera.fov not in SHIPPED:
             views = ", ".join(map(str, SHIPPED))
             raise UnplayableError(
                 f"agent {agent!r}: expected a lidar, or a camera of {_SIZE} pixels and {views} degrees at the default "
@@ -104,9 +103,8 @@ class CameraRanges:
             )
         self._rays = rays_in_view(camera.fov)
         self._network = RangeNetwork(len(self._rays))
-        path = file or pathlib.Path(
-            str(resources.files("mazebench_assets.checkpoints") / f"ranges-{camera.fov:g}.safetensors")
-        )
+        shipped = resources.files("mazebench_assets.checkpoints") / f"ranges-{camera.fov:g}.safetensors"
+        path = pathlib.Path(str(shipped))
         load_into(path, self._network, load_checkpoint(path, NAME)[0])
 
     def beams(self, cells_per_metre: float) -> Beams:
