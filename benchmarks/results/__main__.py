@@ -39,6 +39,6 @@ match sys.argv[1:]:
     case ["recall", out]:
         for agent, (track, level) in itertools.product(RECALL_AGENTS, RECALL_SETTINGS):
             folder = pathlib.Path(out, RECALL, agent, f"{track}-{level}")
-            evaluate(agent, track, folder, level=level, resume=True)
+            evaluate(agent, track, folder, level=level, split="eval", resume=True)
     case _:
         sys.exit(__doc__)

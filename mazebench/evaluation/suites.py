@@ -50,17 +50,19 @@ def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, episodes: i
     return Part(name, TaskOptions(distances=distances, **options), episodes)
 
 
-def _in_words(**options: Any) -> tuple[Part, ...]:
+def _in_words(split: str = "eval") -> tuple[Part, ...]:
     """Returns parts with an episode in each maze, for agents whose answers cost; their names differ from all others."""
     return tuple(
-        Part(f"{track}-{level}-words", TaskOptions(task=track, level=(level,), **options), episodes_per_maze=1)
+        Part(f"{track}-{level}-words", TaskOptions(task=track, level=(level,), split=split), episodes_per_maze=1)
         for track, level in (("building", 1), ("rebuilt", 2), ("adrift", 1), ("adrift", 2))
     )
 
 
-def _each_level(tracks: Iterable[str] = TRACKS, suffix: str = "", **options: Any) -> tuple[Part, ...]:
+def _each_level(
+    tracks: Iterable[str] = TRACKS, suffix: str = "", split: str = "eval", **options: Any
+) -> tuple[Part, ...]:
     return tuple(
-        Part(f"{track}-{level}{suffix}", TaskOptions(task=track, level=(level,), **options))
+        Part(f"{track}-{level}{suffix}", TaskOptions(task=track, level=(level,), split=split, **options))
         for track in tracks
         for level in LEVELS
     )

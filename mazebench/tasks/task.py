@@ -268,9 +268,9 @@ def resolve_in(mazes: Sequence[Maze], asked: TaskOptions) -> Task:
 
 
 def resolve_for_evaluation(asked: TaskOptions, context_size_of: Callable[[int], int] = default_context_size) -> Task:
-    """Returns the task of an evaluation: in eval mazes at distances of 1 to 15 if the options leave them open.
+    """Returns the task of an evaluation, at distances of 1 to 15 if the options leave them open.
 
-    Drawn mazes are those of the split dev, unless the split is train.
+    If they leave the split open, it is dev on tracks and in drawn mazes, and eval in the mazes of the paper's protocol.
 
     Raises:
       InputError: as `resolve`, and if the options name what evaluations do not vary.
@@ -284,7 +284,8 @@ def resolve_for_evaluation(asked: TaskOptions, context_size_of: Callable[[int], 
         found = ", ".join(map(str, asked.level))
         raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' has all levels")
     if asked.split is None:
-        asked = asked.replace(split="dev" if asked.is_drawn else "eval")
+        is_of_tracks = asked.track is not None and asked.mazes is None
+        asked = asked.replace(split="dev" if asked.is_drawn or is_of_tracks else "eval")
     if asked.track is not None and asked.frozen_split is not None:
         other = ", ".join(str(distance) for distance in asked.distances or () if distance not in DISTANCES)
         if other:

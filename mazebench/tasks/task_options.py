@@ -92,8 +92,8 @@ class TaskOptions(SensorOptions, ReadOptions):
         str | None,
         OneOf(*ALL_SPLITS),
         Doc(
-            "The benchmark's training mazes, unseen ones to choose agents on (dev, of tracks), or those for results; "
-            "train if not given, in an evaluation eval."
+            "train: to learn in. dev: to choose agents by, on tracks. eval: for results. If not given, train in an "
+            "environment; in an evaluation dev on tracks, else eval."
         ),
     ] = None
     mazes: Annotated[
