@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import pathlib
 import re
@@ -41,6 +42,7 @@ PAGES = (
     "README.md",
     *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments")),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner")),
+    *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
 )
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
@@ -113,15 +115,30 @@ _WITHOUT_MAP = {
     "neural-planner": ("`neural-planner`", "neural-planner trained without the map"),
     "sb3_agent:FieldPPOAgent": ("PPO", "PPO trained without the map"),
 }
+# Of the tables of expected scores, on tracks and else.
+_EXPECTED = {
+    "random": "`random`",
+    "navigator without map": "`navigator` without the map",
+    "navigator": "`navigator`, classical",
+    "neural-planner": "`neural-planner`, learned",
+    "oracle": "`oracle`, the ceiling",
+}
+_EXPECTED_LOCAL = {
+    "random": "`random`",
+    "dqn": "`dqn`, learned without the map",
+    "mmn": "`mmn`, learned",
+    "navigator": "`navigator`, classical",
+    "oracle": "`oracle`, the ceiling",
+}
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
     "navigator": "`navigator`, classical",
     "navigator without map": "`navigator` without the map",
     "navigator without map and goal": "`navigator` without map and goal",
     "navigator with the true pose": "`navigator` with the true pose",
-    "neural-planner": "`neural-planner`, learned from the oracle",
-    "neural-planner from rewards": "`neural-planner`, learned from rewards",
-    "dagger:Student": "90-second student of the oracle, reads distances on the map",
+    "neural-planner": "`neural-planner`, trained by the oracle's labels",
+    "neural-planner from rewards": "`neural-planner`, trained with rewards",
+    "dagger:Student": "90-second imitation of the oracle, reads distances on the map",
     "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map, progress reward",
     "sb3_agent:FieldRecurrentPPOAgent": "the same with an LSTM, one run",
     "planner-closed-loop": "`planner-closed-loop`, follows the map",
@@ -230,7 +247,7 @@ def tracks_map_worth(kept: Kept) -> str:
     for track, level, own in kept.on_tracks("navigator"):
         both = own, kept.of("navigator without map", f"{track}-{level}")
         rows.append([f"`{track}` {level}", *(_interval(metric, own) for metric in metrics), *_compared(both)[1:]])
-    return format_table(["part", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
+    return format_table(["setting", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
 
 
 def tracks_learned_worth(kept: Kept) -> str:
@@ -292,7 +309,7 @@ def tracks_memory(kept: Kept) -> str:
         episodes = set.intersection(*(set(own.episode) for own in legs))
         cells = _compared([own[own.episode.isin(episodes)] for own in legs])
         rows.append([f"`rebuilt` {level}", str(goal), str(len(episodes)), *cells])
-    header = ["part", "goal", "legs", f"in a row, {METRICS[ON_TIME_125]}", "without memory", "memory worth"]
+    header = ["setting", "goal", "legs", f"in a row, {METRICS[ON_TIME_125]}", "without memory", "memory worth"]
     return format_table(header, rows)
 
 
@@ -305,7 +322,26 @@ def tracks_blocked(kept: Kept) -> str:
             cells = [(str(len(each)), _interval(ON_TIME_125, each)) for each in groups]
             rows.append([f"`{track}` {level}", *cells[0], *cells[1]])
     open_path, blocked = (f"episodes, path on the map {name}" for name in ("open", "blocked"))
-    return format_table(["part", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
+    return format_table(["setting", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
+
+
+def expected_on_track(track: str, kept: Kept) -> str:
+    """Returns each agent's on-time rate at the levels of a track with its interval, and its success rates."""
+    rows = []
+    for agent, text in _EXPECTED.items():
+        levels = [kept.of(agent, f"{track}-{level}") for level in LEVELS]
+        success = " / ".join(_number(own.success_rate.mean()) for own in levels)
+        rows.append([text, *(_interval(ON_TIME_125, own) for own in levels), success])
+    return format_table(["agent", *(f"on time, level {level}" for level in LEVELS), "success, 1 / 2 / 3"], rows)
+
+
+def expected_hierarchical(kept: Kept) -> str:
+    """Returns each agent's success rate and on-time rate from corner to corner, with a landmark every 5 cells."""
+    agents = {text: kept.of(agent, "hierarchical-13-k5") for agent, text in _EXPECTED_LOCAL.items()}
+    rows = [
+        [text, *(_interval(metric, own) for metric in ("success_rate", ON_TIME_125))] for text, own in agents.items()
+    ]
+    return format_table(["agent", "success", METRICS[ON_TIME_125]], rows)
 
 
 def tracks_recall(kept: Kept) -> str:
@@ -342,6 +378,15 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-map-worth": tracks_map_worth,
     "tracks-blocked": tracks_blocked,
     "tracks-recall": tracks_recall,
+    **{f"expected-{track}": functools.partial(expected_on_track, track) for track in TRACKS},
+    "expected-local": lambda kept: by_distance(
+        "agent",
+        {text: (LOCAL, agent) for agent, text in _EXPECTED_LOCAL.items()},
+        "success_rate",
+        _PRINTED_DISTANCES,
+        kept,
+    ),
+    "expected-hierarchical": expected_hierarchical,
     "tracks-memory": tracks_memory,
     "tracks-novel-kinds": lambda kept: by_track(
         {

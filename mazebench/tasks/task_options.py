@@ -84,7 +84,7 @@ class TaskOptions(SensorOptions, ReadOptions):
         int | None,
         Ge(1),
         Doc(
-            "Cells a side of the benchmark's mazes: 13, 15, 17, 19 or 21; of drawn mazes, any that their kinds can "
+            "Cells a side of the benchmark's mazes: 13, 15, 17, 19 or 21; of generated mazes, any that their kinds can "
             "make. If not given, 13, on a track 31, and that of your own mazes."
         ),
     ] = None
@@ -114,30 +114,33 @@ class TaskOptions(SensorOptions, ReadOptions):
     ] = None
     kinds: Annotated[
         tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
-        Doc(f"Mazes that are drawn, of these kinds, as dfs,house; {DRAWN_KINDS[0]} beside the other two options."),
+        Doc(
+            "Generated mazes of these kinds, as dfs,house, in the place of the frozen ones. With num_mazes or fresh "
+            f"alone, the kind is {DRAWN_KINDS[0]}."
+        ),
     ] = ()
-    num_mazes: Annotated[int | None, Ge(1), Doc(f"Drawn mazes of each kind; {NUM_DRAWN} if not given.")] = None
+    num_mazes: Annotated[int | None, Ge(1), Doc(f"Generated mazes of each kind; {NUM_DRAWN} if not given.")] = None
     fresh: Annotated[bool, Doc("Every episode has a new maze, of one of the kinds (not in an evaluation).")] = False
     level: Annotated[
         tuple[Annotated[int, Interval(ge=LEVELS[0], le=LEVELS[-1])], ...] | None,
         Doc(
-            f"Level of the track, {LEVELS[0]} to {LEVELS[-1]} (`mazebench list` says what they mean); of several "
-            "levels, not in an evaluation, each episode draws one; 1 if not given."
+            f"Level of the track, {LEVELS[0]} to {LEVELS[-1]} (see `mazebench list`); {LEVELS[0]} if not given. "
+            "Outside evaluations, several levels may be given, of which each episode draws one."
         ),
     ] = None
     distances: Annotated[
         tuple[Annotated[int, Ge(1)], ...] | None,
         Doc(
-            "Cells from start to goal, on a track metres, as 1-5,8,10 (not of the hierarchical task); if not given, "
-            "1-15 in evaluations and in the benchmark's eval mazes, else 1-5; those of the track; or as far as mazes "
-            "of your own reach."
+            "Cells from start to goal, as 1-5,8,10; metres on a track (not in the hierarchical task). If not given: "
+            "15-40 on a track; in the local task 1-5 for training and 1-15 for evaluation; in mazes of your own as far "
+            "as they reach."
         ),
     ] = None
     start: Annotated[
         str | None,
         ReadBy(functools.partial(place_text, "start")),
         Doc(
-            "Where every episode begins, instead of a drawn cell, or of the upper right corner (hierarchical task): a "
+            "Where every episode begins, instead of a random cell, or of the upper right corner (hierarchical task): a "
             "cell 'row,column', in Python also (row, column), or a point '1.5m,2.5m' (x, y) from the map's lower left "
             "corner."
         ),
@@ -145,7 +148,7 @@ class TaskOptions(SensorOptions, ReadOptions):
     goal: Annotated[
         str | None,
         ReadBy(functools.partial(place_text, "goal")),
-        Doc("Where every episode leads, as for start; instead of a drawn cell, or of the lower left corner."),
+        Doc("Where every episode leads, as for start; instead of a random cell, or of the lower left corner."),
     ] = None
     time_limit: Annotated[
         int | None,
@@ -178,8 +181,8 @@ class TaskOptions(SensorOptions, ReadOptions):
         str,
         OneOf(*REWARDS),
         Doc(
-            "sparse: -1 for each step, 0 for the one that reaches the goal; progress: that and the cells by which the "
-            "step made the way to the goal shorter, for training, with the same best policies (one goal)."
+            "sparse: -1 per step, 0 for the step that reaches the goal. progress: adds the decrease of the path length "
+            "to the goal in cells, which leaves the optimal policy unchanged; for training, with one goal."
         ),
     ] = SPARSE
     actions: Annotated[
@@ -205,13 +208,13 @@ class TaskOptions(SensorOptions, ReadOptions):
         ),
     ] = None
     exact_pose: Annotated[
-        bool, Doc("The observed pose is the true one on a track whose pose is odometry, as a reference.")
+        bool, Doc("On a track whose pose is odometry, observes the true pose instead, as a reference.")
     ] = False
     hide: Annotated[
         tuple[Annotated[str, OneOf(*HIDEABLE)], ...],
         Doc(
             "What the context does not show: map makes planes 0 and 1 zero, goal plane 2 (local task, one goal). "
-            "Results without the map say what the map is worth."
+            "The map worth is measured with it."
         ),
     ] = ()
     sensors: Annotated[

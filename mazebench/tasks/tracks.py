@@ -91,7 +91,7 @@ TRACKS = {
         ),
     ),
     "adrift": Track(
-        "Doors have moved since the map was drawn, and the pose is odometry, which does not tell the place on it.",
+        "Doors have moved since the map was drawn, and the robot only has odometry: its place on the map is unknown.",
         (
             Level(
                 "doors have moved: .7 of the paths are blocked; the start is marked, the heading is unknown",
