@@ -51,7 +51,7 @@ class TestResults:
         assert found.by_distance[10].metrics["success_rate"].difference.value == 0.5
 
     def test_win_share_when_worked_by_hand(self, tmp_path):
-        # The example of docs/metrics.md: a win, a tie, a loss and a tie.
+        # A win, a tie, a loss and a tie.
         ours, theirs = (
             [
                 record(index, maze, 2, score > 0, score)

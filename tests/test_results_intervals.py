@@ -34,7 +34,7 @@ class TestWilson:
 
 
 class TestMeans:
-    # The numbers of docs/metrics.md. Of n effective episodes that all succeed the lower end is n / (n + z^2).
+    # Of n effective episodes that all succeed the lower end is n / (n + z^2).
     @pytest.mark.parametrize(
         ("size", "effective", "low"), [(1, 20, 0.839), (5, 100 / 1.4, 0.949), (75, 1500 / 8.4, 0.979)]
     )
@@ -133,7 +133,7 @@ class TestRunsAndMazes:
         student = stats.t.ppf(0.975, 2) * stats.sem(means)
         over_mazes = mean_interval(self.RUNS.mean(axis=0), self.MAZES)
         found = runs_interval(self.RUNS, self.MAZES)
-        assert (found.value, found.low) == pytest.approx((0.79, 0.22), abs=5e-3)  # docs/metrics.md
+        assert (found.value, found.low) == pytest.approx((0.79, 0.22), abs=5e-3)
         assert found.low == pytest.approx(found.value - np.hypot(student, over_mazes.value - over_mazes.low))
         assert found.high == 1
 

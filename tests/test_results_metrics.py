@@ -55,7 +55,7 @@ def test_figures_worked_by_hand():
 
 class TestOnTime:
     def test_on_time_worked_by_hand(self):
-        # The worked example of docs/metrics.md: five successes in 10 steps, then a failure.
+        # Five successes in 10 steps, then a failure.
         oracle_steps = (8, 7, 5, 4, None, 10)  # 10 is 1.25 x 8 and 2 x 5; the oracle missed the fifth goal
         records = [
             make_record(index, steps=10, success=index < 5, oracle_steps=steps)

@@ -1,6 +1,6 @@
 """95 % intervals of means over episodes, of paired differences, and of means over training runs.
 
-`E` is the number of episodes, `R` of training runs. docs/metrics.md has worked examples and
+`E` is the number of episodes, `R` of training runs. docs/intervals.md has worked examples and
 a simulation of the coverage.
 """
 
@@ -16,7 +16,7 @@ CONFIDENCE = 0.95
 # How much alike the outcomes of one maze's episodes are taken to be where the data do not say: the correlation of two.
 DEFAULT_CORRELATION = 0.1
 # The weight of that default, in independent episodes. Wilson's interval itself adds z^2 = 3.8 of them, half of either
-# kind. With 2 or more, the lower bound never falls when a last failure becomes a success (docs/metrics.md).
+# kind. With 2 or more, the lower bound never falls when a last failure becomes a success.
 _DEFAULT_WEIGHT = 2.0
 _UPPER_TAIL = (1 + CONFIDENCE) / 2
 
@@ -49,7 +49,7 @@ def mean_interval(values: np.ndarray, mazes: np.ndarray) -> Estimate:
 
         d = (S + w d0^2) / (E p (1 - p) + w d0),    at most m,    w = 2.
 
-    docs/metrics.md has a simulation of its coverage. p is the mean, S the sum over mazes of the squared deviations of
+    docs/intervals.md has a simulation of its coverage. p is the mean, S the sum over mazes of the squared deviations of
     the mazes' sums (`_squares_by_maze`), m the mean number of episodes that an episode shares its maze with, itself
     included, and d0 = 1 + (m - 1) 0.1 the design effect for the default correlation (Kish 1965). E p (1 - p) is S as it
     is expected for independent successes. The data prevail where failures and successes are many, the default where
@@ -99,7 +99,7 @@ def runs_interval(values: np.ndarray, mazes: np.ndarray, others: np.ndarray | No
 
     The half-widths of two intervals add as squares, after Zou and Donner (2008): that over mazes, `mean_interval` or
     `difference_interval` of each episode's mean over the runs, and Student's over runs (Welch's of a difference).
-    docs/metrics.md has a simulation of its coverage: too wide where runs differ little, since the chance in single
+    docs/intervals.md has a simulation of its coverage: too wide where runs differ little, since the chance in single
     episodes is in both parts, and too narrow where runs near 1 differ much.
 
     Args:
