@@ -162,7 +162,7 @@ def main() -> None:
     """Trains, writes the network and says its errors."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--fov", type=float, default=75, help="degrees of the camera's view")
-    parser.add_argument("--updates", type=int, default=10_000, help="of 64 pictures each")
+    parser.add_argument("--updates", type=int, default=28_000, help="of 64 pictures each")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="the file to write")
     options = parser.parse_args()
