@@ -1,14 +1,11 @@
-"""The robots of benchmarks/ceilings.py, which know part of the truth, and the coverage of intervals."""
+"""The robots of benchmarks/ceilings.py, which know part of the truth."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import mazebench
 from benchmarks.ceilings import ToldNavigator, _drive, _is_on_time, _sample
-from benchmarks.coverage import coverage, logistic, mean_rate
-from mazebench.results.intervals import Estimate
 from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.trials import select_trials
@@ -71,14 +68,3 @@ def test_the_told_navigator_knows_the_walls_once_one_stands_on_its_path():
     found = mazebench.evaluate(ToldNavigator, "rebuilt", level=2, split="dev", distances=[15], episodes_per_distance=8)
     assert found.privileged
     assert found.overall.success_rate == 1.0
-
-
-class TestCoverage:
-    def test_share_of_the_intervals_that_hold_the_truth(self):
-        assert coverage([Estimate(0.5, 0.4, 0.6), Estimate(0.3, 0.2, 0.4), Estimate(0.5, 0.5, 0.9)], 0.5) == "0.67"
-
-    @pytest.mark.parametrize("of_runs", [0.0, 1.0])
-    def test_mean_of_the_simulated_successes(self, of_runs):
-        assert mean_rate(0.5, of_runs) == pytest.approx(0.5)
-        drawn = [logistic(np.random.default_rng(seed), 0.9, of_runs, 50, 1, 100)[:-1].mean() for seed in range(40)]
-        assert np.mean(drawn) == pytest.approx(mean_rate(0.9, of_runs), abs=0.02)
