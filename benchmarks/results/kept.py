@@ -33,7 +33,7 @@ WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest
 RECALL = "recall"
 RECALL_AGENTS = ("navigator", "neural-planner")
 RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
-# The navigator that learns all walls once it sees one on its path. It plays `rebuilt` only.
+# In records: the navigator that was told all walls once it saw one on its path. It played `rebuilt` only.
 TOLD = "benchmarks.ceilings:ToldNavigator"
 # The settings whose maps lie as the mazes do, with the same doors moved: those with a true pose and registration.
 _REGISTERED = {
