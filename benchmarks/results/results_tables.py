@@ -51,7 +51,7 @@ _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints succes
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
 _KINDS = (*KNOWN, *NOVEL)
-_WITHOUT_MEMORY = "benchmarks.no_memory:NavigatorWithoutMemory"
+_WITHOUT_MEMORY = "benchmarks.no_memory:NavigatorWithoutMemory"  # in records: began each leg as if it were the first
 
 _TRAINED = {
     "mmn": "`mmn`",
