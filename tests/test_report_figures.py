@@ -30,7 +30,9 @@ def draw(folder, name):
 
 def test_no_two_of_twelve_agents_look_alike_and_the_legend_fits(tmp_path):
     points = pd.DataFrame({"column": label, "x": [0, 1], "value": [0, 1]} for label in TWELVE).explode(["x", "value"])
-    figure = draw_panels("A title", [Panel("One", "x", points), Panel("Two", "x", points)], TWELVE)
+    points = points.assign(low95=points.value, high95=points.value)
+    panels = [Panel(title, "x", points, {0: "0", 1: "1"}) for title in ("One", "Two")]
+    figure = draw_panels("A title", panels, TWELVE)
     lines = figure.axes[0].get_lines()
     assert len({(line.get_color(), line.get_marker()) for line in lines}) == 12
     save(figure, tmp_path / "figure")

@@ -14,7 +14,6 @@ import pandas as pd
 from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
-from mazebench.report.curves import SUCCESS
 from mazebench.report.episodes import join_episodes, reported
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
@@ -43,6 +42,7 @@ _REGISTERED = {
     "rough": ("rebuilt-1", "rebuilt-2", "rebuilt-2"),
 }
 _SUFFIX = ".tar.xz"
+SUCCESS = "success_rate_"  # begins the names of success rates in what training runs logged
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
 # Of records.

@@ -22,6 +22,7 @@ from benchmarks.results.kept import (
     RECALL,
     RECALL_AGENTS,
     RECALL_SETTINGS,
+    SUCCESS,
     WORST_TENTH,
     Kept,
     ceilings,
@@ -29,7 +30,6 @@ from benchmarks.results.kept import (
 )
 from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
-from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.records import RECALLS

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -82,7 +82,7 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
             remark(f"{error}; skipped")
     if not results:
         where = ", ".join(map(str, paths))
-        raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
+        raise InputError(f"expected results of `mazebench eval` in {where}, found none to report")
 
     # Labels tell the training runs of an agent apart, where there are several.
     runs = pd.DataFrame([(result.label, result.run) for result in results]).groupby(0)[1].nunique()
@@ -160,20 +160,15 @@ def at_common_distances(episodes: pd.DataFrame) -> pd.DataFrame:
     return episodes[episodes.distance.isin(common)] if common else episodes
 
 
-def folders_below(paths: Iterable[pathlib.Path], is_one: Callable[[set[str]], bool]) -> list[pathlib.Path]:
-    """Returns the folders at or below `paths` whose content `is_one`, by its names; each once, and no hidden ones."""
+def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
+    """Returns the evaluation folders at or below `paths`, also unfinished ones; each once, and no hidden ones."""
     found: dict[pathlib.Path, pathlib.Path] = {}
     for path in paths:
         for folder, subfolders, files in os.walk(path):
-            if is_one({*subfolders, *files}):
+            if not {SUMMARY, EPISODES, JOURNAL}.isdisjoint(files):
                 found.setdefault(pathlib.Path(folder).resolve(), pathlib.Path(folder))
             subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
     return list(found.values())
-
-
-def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
-    """Returns the evaluation folders at or below `paths`, also those that are not finished."""
-    return folders_below(paths, lambda names: not names.isdisjoint({SUMMARY, EPISODES, JOURNAL}))
 
 
 def reported(result: Result) -> ReportedResult:

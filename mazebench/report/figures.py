@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
 
 from mazebench.report.episodes import at_common_distances
 from mazebench.report.table import METRICS, Table
@@ -21,6 +20,7 @@ from mazebench.report.tables import note_on_levels, perturbed_groups
 from mazebench.results.metrics import ON_TIME_METRICS
 
 WIDTH = 7.0  # inches, of a page's text
+_HEIGHT = 2.2  # inches, of a panel
 # Okabe and Ito's colours, told apart with any colour vision; without their yellow, which is faint on white, and with a
 # dark grey for their black, which is for what the paper printed.
 _PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d")
@@ -53,12 +53,10 @@ class Panel(NamedTuple):
 
     title: str
     x_name: str
-    # A line for each point: `column` (whose it is), `x` and `value`; where there are intervals also `low95` and
-    # `high95`.
+    # A line for each point: `column` (whose it is), `x` and `value`, and the interval `low95` and `high95`.
     points: pd.DataFrame
-    ticks: Mapping[float, str] = {}  # texts along the x axis; those of matplotlib if there are none
+    ticks: Mapping[float, str]  # texts along the x axis, at least one
     is_curve: bool = False  # intervals are bands, or else bars, those of several agents beside one another
-    is_score: bool = True  # values are in [0, 1]
 
 
 class Drawn(NamedTuple):
@@ -115,16 +113,15 @@ def draw_panels(
     title: str,
     panels: Sequence[Panel],
     labels: Sequence[str],
-    height: float = 2.2,
     y_name: str = "",
     names: Mapping[str, str] | None = None,
 ) -> Figure:
-    """Returns panels of `height` inches in a grid, the title above, and one legend below them.
+    """Returns panels in a grid, the title above, and one legend below them.
 
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
     some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
-    figure, grid, num_columns = _make_grid(title, [panel.title for panel in panels], height)
+    figure, grid, num_columns = _make_grid(title, [panel.title for panel in panels], _HEIGHT)
     for axes, panel in zip(grid, panels, strict=True):
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
@@ -178,24 +175,20 @@ def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:
     ours = [label for label in labels if label in set(points.column)]
     printed = [label for label in _PAPER_MARKERS if label in set(points.column)]
     step = min(np.diff(ticks), default=1.0)
-    dodge = 0.0 if panel.is_curve or not ticks else min(_DODGE, _DODGES / max(len(ours), 1)) * step
+    dodge = 0.0 if panel.is_curve else min(_DODGE, _DODGES / max(len(ours), 1)) * step
     for place, label in enumerate([*ours, *printed]):
         own, look = points[points.column == label], _look(label, labels)
         x = own.x.astype(float) + (0 if label in printed else (place - (len(ours) - 1) / 2) * dodge)
         axes.plot(x, own.value, **look, markevery=-(-len(own) // 12), label=textwrap.fill(label, 40))
-        if "low95" in own and panel.is_curve:
+        if panel.is_curve:
             axes.fill_between(x, own.low95, own.high95, color=look["color"], alpha=0.14, linewidth=0)
-        elif "low95" in own:
+        else:
             axes.vlines(x, own.low95, own.high95, color=look["color"], linewidth=0.9)
     axes.set_xlabel(panel.x_name)
-    if panel.is_score:
-        axes.set(ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
-    if ticks:
-        _set_ticks(axes, panel.ticks)
-        margin = 0.4 if panel.is_curve else step / 2
-        axes.set_xlim(ticks[0] - margin, ticks[-1] + margin)
-    else:
-        axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+    axes.set(ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
+    _set_ticks(axes, panel.ticks)
+    margin = 0.4 if panel.is_curve else step / 2
+    axes.set_xlim(ticks[0] - margin, ticks[-1] + margin)
 
 
 def _name_lines(axes: Axes, panel: Panel, labels: Sequence[str], names: Mapping[str, str]) -> None:

@@ -17,7 +17,7 @@ from mazebench.report.tables import build_tables
 from mazebench.report.trajectory_figures import draw_trajectories
 from mazebench.storage.files import make_folder, writing_to
 
-DOCUMENT, PAGE, TABLES, FIGURES = "report.md", "report.html", "tables", "figures"
+PAGE, TABLES, FIGURES = "report.html", "tables", "figures"
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")  # in provenance
 
 
@@ -50,7 +50,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
         f"Benchmark {benchmarks}; {', '.join(labels)}; {counted(len(episodes), 'episode')} in "
         f"{counted(len(results), 'result')}."
     )
-    with new_report(out):
+    with _new_report(out):
         for table in tables:
             for suffix, text in table.to_files().items():
                 (out / TABLES / f"{table.name}{suffix}").write_bytes(text.encode(errors="replace"))
@@ -62,7 +62,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
 
 
 @contextlib.contextmanager
-def new_report(out: pathlib.Path) -> Iterator[None]:
+def _new_report(out: pathlib.Path) -> Iterator[None]:
     """Makes the folder of a report, without an earlier report's files.
 
     Raises:
@@ -70,7 +70,7 @@ def new_report(out: pathlib.Path) -> Iterator[None]:
     """
     make_folder(out)
     with writing_to(out):
-        others = sorted({path.name for path in out.iterdir()} - {DOCUMENT, PAGE, TABLES, FIGURES})
+        others = sorted({path.name for path in out.iterdir()} - {PAGE, TABLES, FIGURES})
         if others:
             raise InputError(f"{out}: expected an empty folder or a report's, found {others[0]!r} in it")
         (out / PAGE).unlink(missing_ok=True)
