@@ -198,7 +198,7 @@ class TestFiles:
             assert names == {stem + suffix for stem in stems for suffix in suffixes}
         figures = {path.stem for path in (report / "figures").iterdir()}
         assert figures == tables - {"all"} | {
-            *("violins-flip-hierarchical-13", "violins-noise-local-13", "trajectories-hierarchical"),
+            *("violins-flip-hierarchical-13", "violins-noise-local-13"),
         }
 
     def test_a_later_report_replaces_an_earlier_one(self, tmp_path):

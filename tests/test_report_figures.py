@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 from made_results import make_result
-from matplotlib.colors import to_hex
-from matplotlib.image import imread
 
-from mazebench.maps import colors
 from mazebench.report.episodes import join_episodes, read_results
 from mazebench.report.figures import Panel, draw_panels, draw_table, draw_violins, save
 from mazebench.report.tables import build_tables
-from mazebench.report.trajectory_figures import draw_trajectories
 
 LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
 TWELVE = ["mmn", "planner", "random", *LONG]
@@ -60,16 +56,3 @@ def test_violins_show_the_scores_of_each_level_and_their_mean(tmp_path):
     [axes] = drawn.figure.axes
     assert (axes.get_title("left"), [text.get_text() for text in axes.get_xticklabels()]) == ("mah", ["0", "0.5"])
     assert len(axes.collections) == 3  # two violins, and the means
-
-
-def test_trajectories_are_of_hierarchical_navigation_with_a_row_for_each_agent(tmp_path):
-    for agent in ("mah", "mmn"):
-        make_result(tmp_path / agent / "routes", agent, "hierarchical", num_mazes=2)
-        make_result(tmp_path / agent / "flip", agent, "hierarchical", num_mazes=2, map_flip=0.2)
-        make_result(tmp_path / agent / "local", agent, num_mazes=2)
-    [drawn] = draw_trajectories(episodes_of(tmp_path))
-    assert [axes.get_ylabel() for axes in drawn.figure.axes if axes.get_ylabel()] == ["mah", "mmn"]
-    save(drawn.figure, tmp_path / "figure")
-    pixels = imread(tmp_path / "figure.png")[..., :3]
-    for color in (colors.START, colors.GOAL):
-        assert (abs(pixels - color).max(axis=-1) < 0.01).sum() > 50, to_hex(color)

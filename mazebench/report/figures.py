@@ -19,7 +19,7 @@ from mazebench.report.table import METRICS, Table
 from mazebench.report.tables import note_on_levels, perturbed_groups
 from mazebench.results.metrics import ON_TIME_METRICS
 
-WIDTH = 7.0  # inches, of a page's text
+_WIDTH = 7.0  # inches, of a page's text
 _HEIGHT = 2.2  # inches, of a panel
 # Okabe and Ito's colours, told apart with any colour vision; without their yellow, which is faint on white, and with a
 # dark grey for their black, which is for what the paper printed.
@@ -132,7 +132,7 @@ def draw_panels(
         return figure
     handles = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     lines = [name.split("\n") for name in handles]
-    columns = int(np.clip(13 * WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
+    columns = int(np.clip(13 * _WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
     # The legend makes the figure higher, and leaves the panels as they are.
     figure.set_figheight(figure.get_figheight() + 0.16 * -(-len(lines) // columns) * max(map(len, lines)))
     figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns)
@@ -160,7 +160,7 @@ def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure
     """Returns a figure, axes in it with these titles, as many beside one another as fit, and how many that is."""
     num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
     num_rows = -(-len(titles) // num_columns)
-    width = WIDTH if num_columns > 1 else WIDTH / 1.6
+    width = _WIDTH if num_columns > 1 else _WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]
     title = textwrap.fill(title, int(13 * width))
     height += 0.16 * max(text.count("\n") for text in titles)

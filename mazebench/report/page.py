@@ -24,12 +24,13 @@ from mazebench.maps import colors
 from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import Drawn, to_svg
 from mazebench.report.table import Table
-from mazebench.report.trajectory_figures import TIME_COLORS
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
+# Without the palest yellow, which is invisible on white.
+_TIME_COLORS = mpl.colormaps["plasma"](np.linspace(0, 0.92, 32))
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
 
@@ -118,7 +119,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
         "settings": list(map(str, settings)),
         "rays": NUM_RAYS,
         "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
-        "timeColors": [mpl.colors.to_hex(color) for color in TIME_COLORS(np.linspace(0, 1, 32))],
+        "timeColors": [mpl.colors.to_hex(color) for color in _TIME_COLORS],
         "mazes": [{"name": name, "walls": walls} for name, walls in mazes],
         "results": described,
         "first": results.index(first),

@@ -18,7 +18,7 @@ from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS
 
-DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
+_DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 Rows = dict[str, pd.DataFrame]  # named groups of the episodes of all agents
 Printed = Mapping[str, Mapping[str, Mapping[int, float]]]  # the paper's values by agent, metric and row
 
@@ -85,7 +85,7 @@ def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, str, pd.Data
         alone = alone.assign(strength=alone[perturbation])
         for (task, size, landmarks), group in alone.groupby(["task", "size", "landmark_distance"]):
             name = f"{perturbation.rpartition('_')[2]}-{task}-{size}"
-            name += f"-k{landmarks}" * (landmarks not in (0, DEFAULT_LANDMARK_DISTANCE))
+            name += f"-k{landmarks}" * (landmarks not in (0, _DEFAULT_LANDMARK_DISTANCE))
             if (group.strength > 0).any():
                 yield perturbation, name, group[group.label.isin(group.label[group.strength > 0])]
 

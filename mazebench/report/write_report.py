@@ -14,7 +14,6 @@ from mazebench.report.episodes import ReportedResult, join_episodes, read_result
 from mazebench.report.figures import draw_table, draw_violins, save
 from mazebench.report.page import build_page
 from mazebench.report.tables import build_tables
-from mazebench.report.trajectory_figures import draw_trajectories
 from mazebench.storage.files import make_folder, writing_to
 
 PAGE, TABLES, FIGURES = "report.html", "tables", "figures"
@@ -44,7 +43,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
     figures = [draw_table(table, labels) for table in tables if table.x]
-    figures += [*draw_violins(episodes), *draw_trajectories(episodes)]
+    figures += draw_violins(episodes)
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
         f"Benchmark {benchmarks}; {', '.join(labels)}; {counted(len(episodes), 'episode')} in "
