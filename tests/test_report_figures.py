@@ -6,7 +6,7 @@ import pandas as pd
 from made_results import make_result
 
 from mazebench.report.episodes import join_episodes, read_results
-from mazebench.report.figures import Panel, draw_panels, draw_table, draw_violins, save
+from mazebench.report.figures import Panel, draw_panels, draw_table, save
 from mazebench.report.tables import build_tables
 
 LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
@@ -21,7 +21,7 @@ def draw(folder, name):
     """The figure of a table."""
     episodes = episodes_of(folder)
     [table] = [table for table in build_tables(episodes) if table.name == name]
-    return draw_table(table, list(episodes.label.cat.categories)).figure
+    return draw_table(table, list(episodes.label.cat.categories))
 
 
 def test_no_two_of_twelve_agents_look_alike_and_the_legend_fits(tmp_path):
@@ -47,12 +47,3 @@ def test_what_the_paper_printed_looks_like_no_agent(tmp_path):
     looks = {line.get_label(): (line.get_color(), line.get_marker()) for line in lines}
     assert list(looks) == [*labels, *(f"{agent} (paper)" for agent in ("MMN", "MAH", "DQN", "Random"))]
     assert len(set(looks.values())) == 8
-
-
-def test_violins_show_the_scores_of_each_level_and_their_mean(tmp_path):
-    make_result(tmp_path / "plain", "mah", num_mazes=3, record=False)
-    make_result(tmp_path / "noise", "mah", num_mazes=3, record=False, position_noise=0.5)
-    [drawn] = draw_violins(episodes_of(tmp_path))
-    [axes] = drawn.figure.axes
-    assert (axes.get_title("left"), [text.get_text() for text in axes.get_xticklabels()]) == ("mah", ["0", "0.5"])
-    assert len(axes.collections) == 3  # two violins, and the means

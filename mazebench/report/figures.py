@@ -1,4 +1,4 @@
-"""Figures by matplotlib: curves of tables, violins of the perturbations that the paper has them of, and their files."""
+"""Figures by matplotlib: curves of tables, and their files."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mazebench.report.episodes import at_common_distances
 from mazebench.report.table import METRICS, Table
-from mazebench.report.tables import note_on_levels, perturbed_groups
 from mazebench.results.metrics import ON_TIME_METRICS
 
 _WIDTH = 7.0  # inches, of a page's text
@@ -59,16 +57,7 @@ class Panel(NamedTuple):
     is_curve: bool = False  # intervals are bands, or else bars, those of several agents beside one another
 
 
-class Drawn(NamedTuple):
-    """A figure with its words."""
-
-    name: str  # of its files
-    title: str
-    note: str
-    figure: Figure
-
-
-def draw_table(table: Table, labels: Sequence[str]) -> Drawn:
+def draw_table(table: Table, labels: Sequence[str]) -> Figure:
     """Returns the curves of a table: success rate, on time by the first factor, and SPL.
 
     SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours.
@@ -84,28 +73,7 @@ def draw_table(table: Table, labels: Sequence[str]) -> Drawn:
         for metric, name in METRICS.items()
         if metric in metrics and len(points := single[single.metric == metric])
     ]
-    return Drawn(table.name, table.title, table.note, draw_panels(table.title, panels, labels))
-
-
-@mpl.rc_context(_STYLE)
-def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
-    """Returns violins of SPL by the strength of a perturbation, on the benchmark's eval mazes: a panel per agent."""
-    figures = []
-    for perturbation, name, group in perturbed_groups(episodes[episodes.mazes == ""]):
-        if perturbation not in ("map_flip", "position_noise"):  # of which the paper shows the distribution of SPL
-            continue
-        agents = list(at_common_distances(group).groupby("label", observed=True))
-        strength_name = perturbation.replace("_", " ")
-        title = f"SPL by {strength_name}: {group.task.iloc[0]}"
-        figure, grid, _ = _make_grid(title, [label for label, _ in agents], 2.1)
-        for axes, (_, own) in zip(grid, agents, strict=True):
-            levels, scores = zip(*own.groupby("strength").spl, strict=True)
-            places = range(len(levels))
-            axes.violinplot([each.to_numpy() for each in scores], places, widths=0.8, showmeans=True, showextrema=False)
-            _set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
-            axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05))
-        figures.append(Drawn(f"violins-{name}", title, f"{note_on_levels(perturbation, group)} Dashes: means.", figure))
-    return figures
+    return draw_panels(table.title, panels, labels)
 
 
 @mpl.rc_context(_STYLE)

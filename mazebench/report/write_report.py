@@ -11,7 +11,7 @@ import pandas as pd
 
 from mazebench.errors import InputError, remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
-from mazebench.report.figures import draw_table, draw_violins, save
+from mazebench.report.figures import draw_table, save
 from mazebench.report.page import build_page
 from mazebench.report.tables import build_tables
 from mazebench.storage.files import make_folder, writing_to
@@ -42,8 +42,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     episodes = join_episodes(results)
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
-    figures = [draw_table(table, labels) for table in tables if table.x]
-    figures += draw_violins(episodes)
+    figures = {table.name: draw_table(table, labels) for table in tables if table.x}
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
         f"Benchmark {benchmarks}; {', '.join(labels)}; {counted(len(episodes), 'episode')} in "
@@ -53,8 +52,8 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
         for table in tables:
             for suffix, text in table.to_files().items():
                 (out / TABLES / f"{table.name}{suffix}").write_bytes(text.encode(errors="replace"))
-        for drawn in figures:
-            save(drawn.figure, out / FIGURES / drawn.name)
+        for name, figure in figures.items():
+            save(figure, out / FIGURES / name)
         page = build_page(results, head, tables, figures, provenance_of(results), notes)
         (out / PAGE).write_bytes(page.encode(errors="replace"))  # names of folders need not be legal Unicode
     return results
