@@ -47,7 +47,7 @@ MOST_GOALS = 5  # of an episode on a track, all of which its shown map keeps fre
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
-_RETIRED = (("textures", False),)  # options of earlier versions, and the values that said nothing
+_RETIRED = (("textures", False), ("walls", "filled"))  # options of earlier versions, and the values that said nothing
 # Fields that an agent may choose, or is not told, while the same is played.
 _OF_AGENTS = ("actions", "sensors", *CAMERA_OPTIONS, "hide", "exact_pose", "context_size")
 
