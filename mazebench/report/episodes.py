@@ -73,9 +73,9 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     """
     results = []
     for path in paths:
-        if not find_evaluations([path]):
+        if not _find_evaluations([path]):
             remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
-    for folder in find_evaluations(paths):
+    for folder in _find_evaluations(paths):
         try:
             results.append(reported(load_result(folder)))
         except InputError as error:
@@ -158,7 +158,7 @@ def at_common_distances(episodes: pd.DataFrame) -> pd.DataFrame:
     return episodes[episodes.distance.isin(common)] if common else episodes
 
 
-def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
+def _find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     """Returns the evaluation folders at or below `paths`, also unfinished ones; each once, and no hidden ones."""
     found: dict[pathlib.Path, pathlib.Path] = {}
     for path in paths:
