@@ -19,7 +19,6 @@ from mazebench.commands.compare import compare
 from mazebench.commands.eval import evaluate
 from mazebench.commands.generate import generate
 from mazebench.commands.list import list_
-from mazebench.commands.play import play
 from mazebench.commands.prompt import prompt
 from mazebench.commands.render import render
 from mazebench.commands.report import report
@@ -39,14 +38,13 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command(short_help="Make mazes: MJCF, text, picture, mesh.")(generate)
+app.command(short_help="Make mazes: MJCF, text, picture, ROS map.")(generate)
 app.command("eval", short_help="Evaluate agents on unseen mazes.")(evaluate)
 app.command(short_help="Compare two agents on the same episodes.")(compare)
 app.command(short_help="Collect demonstrations of an agent.")(collect)
 app.command(short_help="Train an agent on the training mazes.")(train)
 app.command(short_help="Make tables, figures and a page of results.")(report)
 app.command(short_help="Film or picture an episode.")(render)
-app.command(short_help="Drive yourself, with the keyboard.")(play)
 app.command(short_help="Show what a language model is asked.")(prompt)
 app.command(short_help="Measure speed on this machine.")(bench)
 app.command("list", short_help="List tasks, agents, sizes and kinds of mazes.")(list_)

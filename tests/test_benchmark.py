@@ -12,6 +12,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
+import mazebench
 from benchmarks import freeze
 from mazebench.errors import InputError
 from mazebench.maps import benchmark
@@ -112,6 +113,16 @@ def test_shortest_paths_when_computed_again(task, size, count):
         expected = paths.length(cell_to_point(episode.start, size), episode.goal)
         assert trial.shortest_path == pytest.approx(expected, abs=1e-8)
         assert 0.5 - 1e-9 <= trial.shortest_path <= trial.distance - 0.5 + 1e-8
+
+
+def test_the_croissant_description_has_the_hashes_of_the_files():
+    assets = resources.files("mazebench_assets")
+    described = json.loads(assets.joinpath("croissant.json").read_text())
+    files = {file["@id"]: file["sha256"] for file in described["distribution"]}
+    assert files == {name: hashlib.sha256(assets.joinpath(name).read_bytes()).hexdigest() for name in files}
+    for name, folder in benchmark.FOLDERS.items():
+        assert {f"{folder}/{file}" for file in (benchmark.MANIFEST, *benchmark.manifest(name)["files"])} <= set(files)
+    assert f"version={{{mazebench.__version__}}}" in described["citeAs"]
 
 
 class TestRefusal:

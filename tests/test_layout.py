@@ -14,7 +14,7 @@ import gymnasium  # which sets a variable of pygame's
 before = dict(os.environ)
 import mazebench
 is_same = dict(os.environ) == before
-names = ("mujoco", "dm_control", "torch", "cv2", "scipy", "numba", "ray", "matplotlib")
+names = ("mujoco", "dm_control", "torch", "cv2", "scipy", "numba", "matplotlib")
 heavy = [name for name in names if name in sys.modules]
 import mazebench.cli  # `render` and `bench` choose a backend before MuJoCo reads it
 heavy += [name for name in ("mujoco", "dm_control", "torch") if name in sys.modules]

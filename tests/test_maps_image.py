@@ -10,7 +10,6 @@ import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies as st
-from scipy import ndimage
 
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
@@ -26,8 +25,8 @@ SEEDS = st.integers(0, 2**32 - 1)
 FEW = hypothesis.settings(max_examples=100, deadline=None)
 
 
-def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maze", walls: str = "filled") -> Maze:
-    return locate_maze(grid_of_image(image, size, name, walls), ReadOptions(), name).maze
+def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maze") -> Maze:
+    return locate_maze(grid_of_image(image, size, name), ReadOptions(), name).maze
 
 
 def blocks(walls: np.ndarray, cell_pixels: int) -> np.ndarray:
@@ -194,43 +193,6 @@ def test_a_plan_is_read_when_the_paper_is_squared_and_cells_have_letters(maze):
     assert maze_from_image(image) == maze
 
 
-def without_pillars(walls: np.ndarray) -> np.ndarray:
-    """The walls without single cells of wall, for which a drawing of lines has no line."""
-    beside = np.pad(walls, 1)
-    beside = beside[:-2, 1:-1] | beside[2:, 1:-1] | beside[1:-1, :-2] | beside[1:-1, 2:]
-    return walls & beside
-
-
-def line_drawing(walls: np.ndarray, room_pixels: int, line: int, has_gaps: bool) -> np.ndarray:
-    """A maze of rooms (odd rows and columns of `walls`) with lines as walls; gaps are entrance and exit."""
-    rows, columns = walls.shape
-    margin = 40
-    image = np.full((rows // 2 * room_pixels + 2 * margin, columns // 2 * room_pixels + 2 * margin), 255, np.uint8)
-    for row, column in np.argwhere(walls):
-        at = margin + np.array([column - column % 2, row - row % 2]) // 2 * room_pixels
-        reach = np.array([column % 2, row % 2]) * room_pixels
-        if (row, column) not in ((0, 1), (rows - 1, columns - 2)) or not has_gaps:
-            cv2.line(image, at.tolist(), (at + reach).tolist(), 0, line)
-    return image
-
-
-@hypothesis.given(SEEDS, st.integers(4, 14), st.integers(4, 14), st.integers(14, 40), st.booleans())
-@hypothesis.settings(max_examples=3, deadline=None)
-def test_a_maze_of_lines_between_rooms_is_read_when_asked_for(seed, rows, columns, room_pixels, has_gaps):
-    hypothesis.assume(max(rows, columns) <= 2 * min(rows, columns))
-    rng = np.random.default_rng(seed)
-    walls = generate("dfs", 2 * max(rows, columns) + 1, rng).walls[: 2 * rows + 1, : 2 * columns + 1].copy()
-    walls[[0, -1]] = walls[:, [0, -1]] = True
-    walls = without_pillars(walls)
-    image = line_drawing(walls, room_pixels, int(rng.integers(1, max(2, room_pixels // 5))), has_gaps)
-    components = np.unique(ndimage.label(~walls)[0])
-    if len(components) > 2:
-        with pytest.raises(MazeError, match="expected one connected free area"):
-            maze_from_image(image, walls="lines")
-    else:
-        assert maze_from_image(image, walls="lines") == padded(walls)
-
-
 def thin_line_plan(num_cells: int, cell_pixels: int, line: int, frame: int, blur: float) -> np.ndarray:
     """Rooms between lines, a door in each, inside a frame, on paper."""
     side, margin = num_cells * cell_pixels, 40
@@ -248,7 +210,6 @@ def thin_line_plan(num_cells: int, cell_pixels: int, line: int, frame: int, blur
 MAZE = generate("dfs", 13, np.random.default_rng(0))
 PAGE = "m: expected dark walls on light paper, found a page of one shade"
 INVERTED = "m: expected dark walls on a light ground, found light ones on a dark ground; invert"
-LINES = r"expected rooms in an upright square grid with lines .* needs --pixel-size"
 NOISE = np.random.default_rng(0).integers(0, 256, (120, 90, 3), dtype=np.uint8)
 
 
@@ -304,15 +265,14 @@ def with_line_across_the_floor() -> np.ndarray:
         (
             thin_line_plan(8, 40, 2, 2, 0),
             {},
-            "filled walls as thick as a cell, found only lines between 8 x 8 cells; read them with --walls lines",
+            "filled walls as thick as a cell, found only lines between 8 x 8 cells; a floor plan with thin walls",
         ),
         (
             thin_line_plan(12, 30, 3, 3, 0),
             {},
-            r"\(are the walls lines\? read them with --walls lines; a floor plan with thin walls needs --pixel-size",
+            r"\(are the walls lines\? a floor plan with thin walls needs --pixel-size",
         ),
         (thin_line_plan(8, 24, 1, 8, 1.2), {}, "expected"),
-        (NOISE, {"walls": "lines"}, LINES),
     ],
 )
 def test_a_picture_that_is_not_read_gets_a_line_that_helps(image, options, message):

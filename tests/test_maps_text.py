@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 import mazebench
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.maze_files import read_located, read_maze
+from mazebench.maps.maze_files import read_maze
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED
 from mazebench.maps.readers.text_map import grid_of_text
 from mazebench.maps.text import format_maze, parse_maze
@@ -167,14 +167,6 @@ class TestReading:
         assert maze.name == "gr\\udcf6\\x1b"
         assert mazebench.load(mazes=maze, distances=[2]).physics is not None
 
-    def test_a_house_is_the_floor_within_its_outline(self, tmp_path):
-        corners = [[1, 1], [5, 1], [5, 3], [3, 3], [3, 5], [1, 5]]
-        house = {"id": "a", "verts": corners, "room_category": {"Kitchen": [[1, 1, 3, 3]]}}
-        (tmp_path / "house.json").write_text(json.dumps(house))
-        maze, (x, y, _) = read_located(tmp_path / "house.json", cell_size=0.5)
-        for point, is_free in {(2, 2): True, (4, 2): True, (2, 4): True, (4, 4): False}.items():
-            assert maze.is_free(maze.cell_at(point[0] - x, point[1] - y)) == is_free
-
 
 class TestRefusal:
     @pytest.mark.parametrize(
@@ -188,10 +180,9 @@ class TestRefusal:
             (PLAN + "\n" + PLAN, "expected one maze, found 2 with blank lines between"),
             (2 * "1,1,1\n1,0,1\n1,1,1\n\n", "expected one maze, found 2 with blank lines between"),
             (MOVING_AI.replace("height 5", "height 6"), "expected a MovingAI map of 6 rows of 5 cells"),
-            ('{"rooms": [], "id": 3}', "expected a HouseExpo house, .* found the keys rooms, id$"),
+            ('{"rooms": [], "id": 3}', "expected JSON with one list of rows, found the keys rooms, id$"),
             ('{"type": "FeatureCollection", "features": []}', "found the keys type, features; draw the plan"),
-            ('{"verts": {}}', "expected verts of a HouseExpo house"),
-            ('{"verts": ' + "[" * 100_000, "expected a HouseExpo house"),
+            ('{"grid": ' + "[" * 100_000, "expected JSON with one list of rows"),
             ("1,0,1\n1,,1\n1,1,1\n", r"expected a value in each field, found none at \(1, 1\)$"),
             ("1,0,1\n1,0\n1,1,1\n", r"expected 3 fields in each row, found 2 in row 1$"),
             ("0.0,1.0,2.0\n1,0,1\n1,1,1\n", r"found 0.0, 1.0, 2.0, ... in row 0, a header or an index"),

@@ -21,7 +21,6 @@ from faults import (
     PATIENCE,
     TRAIN,
     Disk,
-    command_line,
     descendants,
     num_bytes,
     num_metrics,
@@ -120,21 +119,6 @@ class TestKill:
         status, _, errors = run(*LEARN, "--out", folder, "--resume")
         assert (status, errors) == (0, "")
         assert learned_in(folder) == learned_in(unbroken("learn"))
-
-
-class TestRay:
-    """Ray prints lines of its own among a command's errors, so these tests only look for ours."""
-
-    def test_nothing_is_left_running_when_stopped_while_ray_starts(self, tmp_path):
-        pytest.importorskip("ray")
-        process = start(*LONG, "--ray", "--workers", "2", "--out", "run", cwd=tmp_path)
-        wait_until(lambda: any("gcs_server" in command_line(pid) for pid in descendants(process.pid)), process)
-        started = descendants(process.pid)
-        process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 143, errors
-        assert "mazebench: terminated; " in errors
-        wait_for_ends(started)
 
 
 class TestFullDisk:

@@ -197,9 +197,7 @@ class TestFiles:
             stems = {name.removesuffix(suffixes[0]) for name in names if name.endswith(suffixes[0])}
             assert names == {stem + suffix for stem in stems for suffix in suffixes}
         figures = {path.stem for path in (report / "figures").iterdir()}
-        assert figures == tables - {"all"} | {
-            *("violins-flip-hierarchical-13", "violins-noise-local-13", "trajectories-hierarchical"),
-        }
+        assert figures == tables - {"all"}
 
     def test_a_later_report_replaces_an_earlier_one(self, tmp_path):
         make_result(tmp_path / "a", "mah", num_mazes=1, record=False)

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 from made_results import make_result
-from matplotlib.colors import to_hex
-from matplotlib.image import imread
 
-from mazebench.maps import colors
 from mazebench.report.episodes import join_episodes, read_results
-from mazebench.report.figures import Panel, draw_panels, draw_table, draw_violins, save
+from mazebench.report.figures import Panel, draw_panels, draw_table, save
 from mazebench.report.tables import build_tables
-from mazebench.report.trajectory_figures import draw_trajectories
 
 LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
 TWELVE = ["mmn", "planner", "random", *LONG]
@@ -25,12 +21,14 @@ def draw(folder, name):
     """The figure of a table."""
     episodes = episodes_of(folder)
     [table] = [table for table in build_tables(episodes) if table.name == name]
-    return draw_table(table, list(episodes.label.cat.categories)).figure
+    return draw_table(table, list(episodes.label.cat.categories))
 
 
 def test_no_two_of_twelve_agents_look_alike_and_the_legend_fits(tmp_path):
     points = pd.DataFrame({"column": label, "x": [0, 1], "value": [0, 1]} for label in TWELVE).explode(["x", "value"])
-    figure = draw_panels("A title", [Panel("One", "x", points), Panel("Two", "x", points)], TWELVE)
+    points = points.assign(low95=points.value, high95=points.value)
+    panels = [Panel(title, "x", points, {0: "0", 1: "1"}) for title in ("One", "Two")]
+    figure = draw_panels("A title", panels, TWELVE)
     lines = figure.axes[0].get_lines()
     assert len({(line.get_color(), line.get_marker()) for line in lines}) == 12
     save(figure, tmp_path / "figure")
@@ -49,25 +47,3 @@ def test_what_the_paper_printed_looks_like_no_agent(tmp_path):
     looks = {line.get_label(): (line.get_color(), line.get_marker()) for line in lines}
     assert list(looks) == [*labels, *(f"{agent} (paper)" for agent in ("MMN", "MAH", "DQN", "Random"))]
     assert len(set(looks.values())) == 8
-
-
-def test_violins_show_the_scores_of_each_level_and_their_mean(tmp_path):
-    make_result(tmp_path / "plain", "mah", num_mazes=3, record=False)
-    make_result(tmp_path / "noise", "mah", num_mazes=3, record=False, position_noise=0.5)
-    [drawn] = draw_violins(episodes_of(tmp_path))
-    [axes] = drawn.figure.axes
-    assert (axes.get_title("left"), [text.get_text() for text in axes.get_xticklabels()]) == ("mah", ["0", "0.5"])
-    assert len(axes.collections) == 3  # two violins, and the means
-
-
-def test_trajectories_are_of_hierarchical_navigation_with_a_row_for_each_agent(tmp_path):
-    for agent in ("mah", "mmn"):
-        make_result(tmp_path / agent / "routes", agent, "hierarchical", num_mazes=2)
-        make_result(tmp_path / agent / "flip", agent, "hierarchical", num_mazes=2, map_flip=0.2)
-        make_result(tmp_path / agent / "local", agent, num_mazes=2)
-    [drawn] = draw_trajectories(episodes_of(tmp_path))
-    assert [axes.get_ylabel() for axes in drawn.figure.axes if axes.get_ylabel()] == ["mah", "mmn"]
-    save(drawn.figure, tmp_path / "figure")
-    pixels = imread(tmp_path / "figure.png")[..., :3]
-    for color in (colors.START, colors.GOAL):
-        assert (abs(pixels - color).max(axis=-1) < 0.01).sum() > 50, to_hex(color)

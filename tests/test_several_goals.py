@@ -11,7 +11,6 @@ from run_folders import Killed, kill_after, records_of, results_of, summary_of
 from simple_mazes import field
 
 from benchmarks.freeze_goals import freeze_goals
-from benchmarks.no_memory import NavigatorWithoutMemory
 from mazebench.agent import SingleAgent
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.measured_oracle import measure_steps_of_legs
@@ -126,9 +125,6 @@ class TestRecords:
 
 
 class TestSuites:
-    def test_a_navigator_that_forgets_reaches_all_goals(self):
-        assert evaluate(NavigatorWithoutMemory, **NEAR).overall.success_rate == 1.0
-
     @pytest.mark.slow
     def test_one_command_makes_the_files_byte_for_byte(self, tmp_path):
         freeze_goals(tmp_path)

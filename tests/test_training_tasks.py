@@ -120,11 +120,3 @@ def test_held_out_goals_are_at_five_of_the_distances(task, distances, wanted):
     spec = Task.of(**task, **({"distances": distances} if distances else {}))
     evaluation = HeldOutEvaluation(spec, 2, distances)
     assert sorted({trial.distance for trial in evaluation.trials}) == wanted
-
-
-def test_scenarios_have_one_goal_as_fixed_pairs_have(tmp_path):
-    (tmp_path / "m.map").write_text("type octile\nheight 3\nwidth 3\nmap\n...\n.@.\n...\n")
-    (tmp_path / "m.scen").write_text("version 1\n0 m.map 3 3 0 0 2 2 4\n0 m.map 3 3 0 0 1 0 1\n")
-    train(**tiny_options(mazes=str(tmp_path / "m.scen")), out=tmp_path / "run")
-    task = task_in(tmp_path / "run")
-    assert (task["distances"], task["num_goals"]) == ([1, 4], 1)

@@ -27,8 +27,8 @@ match sys.argv[1:]:
         kept = read_kept(RECORDS)
         for page in PAGES:
             (ROOT / page).write_bytes(with_tables((ROOT / page).read_text("utf-8"), kept).encode())
-        for drawn in figures(kept):
-            (ROOT / f"docs/images/{drawn.name}.svg").write_bytes(to_svg(drawn.figure))
+        for name, figure in figures(kept).items():
+            (ROOT / f"docs/images/{name}.svg").write_bytes(to_svg(figure))
     case ["keep", *folders]:
         for folder in folders:
             path = keep(pathlib.Path(folder), RECORDS)

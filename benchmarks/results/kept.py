@@ -14,7 +14,6 @@ import pandas as pd
 from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
-from mazebench.report.curves import SUCCESS
 from mazebench.report.episodes import join_episodes, reported
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
@@ -33,7 +32,7 @@ WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest
 RECALL = "recall"
 RECALL_AGENTS = ("navigator", "neural-planner")
 RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
-# The navigator that learns all walls once it sees one on its path. It plays `rebuilt` only.
+# In records: the navigator that was told all walls once it saw one on its path. It played `rebuilt` only.
 TOLD = "benchmarks.ceilings:ToldNavigator"
 # The settings whose maps lie as the mazes do, with the same doors moved: those with a true pose and registration.
 _REGISTERED = {
@@ -43,6 +42,7 @@ _REGISTERED = {
     "rough": ("rebuilt-1", "rebuilt-2", "rebuilt-2"),
 }
 _SUFFIX = ".tar.xz"
+SUCCESS = "success_rate_"  # begins the names of success rates in what training runs logged
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
 # Of records.

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from benchmarks.results.kept import LOCAL, ON_TIME_125, Kept, estimate
-from mazebench.report.figures import Drawn, Panel, draw_panels, draw_table
+from mazebench.report.figures import Panel, draw_panels, draw_table
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 # Each line's place is its colour and marker, in all figures.
@@ -27,28 +28,27 @@ _NAMES = {
 }
 
 
-def figures(kept: Kept) -> list[Drawn]:
-    """Returns all figures that pages show."""
+def figures(kept: Kept) -> dict[str, Figure]:
+    """Returns all figures that pages show, by the names of their files."""
     local = kept.report[LOCAL]
     some = local.values.column.isin(["mmn", "mah", "mah-paper", "dqn", "random", "MMN (paper)"])  # miss some goals
     local = dataclasses.replace(local, values=local.values[some])
     agents = ("navigator", "navigator without map", "navigator with the true pose")
-    return [
-        on_time("map-worth", "What the map is worth", {agent: (agent, (False, True)) for agent in agents}, kept),
-        on_time(
-            "what-fails",
+    return {
+        "map-worth": on_time("What the map is worth", {agent: (agent, (False, True)) for agent in agents}, kept),
+        "what-fails": on_time(
             "Where the navigator is late",
             {"open path": ("navigator", (False,)), "blocked path": ("navigator", (True,))},
             kept,
         ),
-        budget(kept),
-        wrong_maps(kept),
-        model_and_search(kept),
-        draw_table(local, _LOOKS),
-    ]
+        "budget": budget(kept),
+        "wrong-maps": wrong_maps(kept),
+        "model-and-search": model_and_search(kept),
+        LOCAL: draw_table(local, _LOOKS),
+    }
 
 
-def on_time(name: str, title: str, lines: Mapping[str, tuple[str, Sequence[bool]]], kept: Kept) -> Drawn:
+def on_time(title: str, lines: Mapping[str, tuple[str, Sequence[bool]]], kept: Kept) -> Figure:
     """Returns on-time rates by track and level.
 
     A line is of an agent where the shortest path on the map is open (False), blocked (True), or either.
@@ -62,10 +62,10 @@ def on_time(name: str, title: str, lines: Mapping[str, tuple[str, Sequence[bool]
     ]
     by_track = pd.DataFrame(points).groupby("panel", sort=False)
     panels = [Panel(track, "level", own, dict(enumerate(map(str, LEVELS)))) for track, own in by_track]
-    return _figure(name, title, panels, "on-time rate")
+    return _figure(title, panels, "on-time rate")
 
 
-def budget(kept: Kept) -> Drawn:
+def budget(kept: Kept) -> Figure:
     """Returns the share of episodes that reach the goal within a budget of steps, at level 2 of each track."""
     panels = []
     for track in TRACKS:
@@ -78,10 +78,10 @@ def budget(kept: Kept) -> Drawn:
                 points.append({"column": agent, "x": factor, "value": value, "low95": value, "high95": value})
         ticks = {x: f"{x:g}" for x in (1.0, 1.25, 2.0, 3.0)}
         panels.append(Panel(f"{track} 2", "budget, times the oracle's steps", pd.DataFrame(points), ticks, True))
-    return _figure("budget", "Success over the budget of steps", panels)
+    return _figure("Success over the budget of steps", panels)
 
 
-def wrong_maps(kept: Kept) -> Drawn:
+def wrong_maps(kept: Kept) -> Figure:
     """Returns success rates on wrong maps of the paper's protocol, without a lidar."""
     panels = []
     for title, name in (
@@ -93,10 +93,10 @@ def wrong_maps(kept: Kept) -> Drawn:
         points = values[values.column.isin(["planner-closed-loop", "mah", "mmn", "navigator"])]
         points = points.assign(x=points.row.cat.codes)
         panels.append(Panel(title, "", points, dict(enumerate(table.x))))
-    return _figure("wrong-maps", "Wrong maps without a lidar", panels)
+    return _figure("Wrong maps without a lidar", panels)
 
 
-def model_and_search(kept: Kept) -> Drawn:
+def model_and_search(kept: Kept) -> Figure:
     """Returns learning curves of mmn, of Q-learning with its reading of the map, and of mah: means over their runs.
 
     Bars reach from the lowest to the highest run. Milestones count as the nearest tenth of a million steps.
@@ -109,8 +109,8 @@ def model_and_search(kept: Kept) -> Drawn:
         points = points.rename(columns={"mean": "value", "min": "low95", "max": "high95"})
         panels.append(Panel(f"{distance} cells", "million agent steps", points, ticks))
     title = "Success rate on held-out mazes over training: mean, lowest and highest run"
-    return _figure("model-and-search", title, panels)
+    return _figure(title, panels)
 
 
-def _figure(name: str, title: str, panels: Sequence[Panel], y_name: str = "success rate") -> Drawn:
-    return Drawn(name, title, "", draw_panels(title, panels, _LOOKS, y_name=y_name, names=_NAMES))
+def _figure(title: str, panels: Sequence[Panel], y_name: str = "success rate") -> Figure:
+    return draw_panels(title, panels, _LOOKS, y_name, _NAMES)

@@ -23,6 +23,7 @@ from benchmarks.results.kept import (
     RECALL,
     RECALL_AGENTS,
     RECALL_SETTINGS,
+    SUCCESS,
     WORST_TENTH,
     Kept,
     ceilings,
@@ -30,7 +31,6 @@ from benchmarks.results.kept import (
 )
 from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
-from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.records import RECALLS
@@ -53,7 +53,7 @@ _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints succes
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
 _KINDS = (*KNOWN, *NOVEL)
-_WITHOUT_MEMORY = "benchmarks.no_memory:NavigatorWithoutMemory"
+_WITHOUT_MEMORY = "benchmarks.no_memory:NavigatorWithoutMemory"  # in records: began each leg as if it were the first
 
 _TRAINED = {
     "mmn": "`mmn`",

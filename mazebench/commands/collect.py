@@ -16,7 +16,7 @@ from mazebench.options import options_in
 from mazebench.tasks.task_options import TaskOptions
 
 _WITHOUT = (
-    *("resume", "record", "workers", "ray", "ray_address"),  # one process collects all
+    *("resume", "record", "workers"),  # one process collects all
     *(*EPISODES, "num_goals", "context_size", "reward"),  # as in evaluations, which agents play
 )
 

@@ -44,7 +44,7 @@ def evaluate(
         pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
     ] = None,
     show_traceback: Annotated[
-        bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers or --ray.")
+        bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers.")
     ] = False,
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""

@@ -15,7 +15,7 @@ from mazebench.results.paper import printed_mmn
 from mazebench.results.records import Figures, Summary
 
 _ANY_WIDTH = 10_000  # characters
-_MOST_DISTANCES = 20  # of a table; scenarios may have hundreds
+_MOST_DISTANCES = 20  # of a table; --distances may name hundreds
 _HEAD = ("n", "success rate", "on time", "SPL", "SPL by grid")
 _RECALL_HEAD = ("pose 1 m", "pose 1 m, 30 deg")  # of agents that report poses
 _RECALL_NOTE = "pose: share of steps whose reported pose is within it, then that of episodes at their end"

@@ -14,7 +14,6 @@ from mazebench.maps.maze import Maze
 from mazebench.tasks.actions import controls_of_action, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
-from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.route import Route
 from mazebench.tasks.rules import Rules
 from mazebench.tasks.task import Task
@@ -66,11 +65,6 @@ class TaskRunner:
     def episode(self) -> Episode:
         """The running episode, or the one that ended last."""
         return _only(self.rules.episodes)
-
-    @property
-    def shown_map(self) -> ShownMap:
-        """The map that the agent is shown in the episode."""
-        return _only(self.rules.shown)
 
     @property
     def route(self) -> Route:

@@ -19,8 +19,6 @@ from mazebench.agent import Agent, Observation
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import YAW, X, Y
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent
 from mazebench.evaluation.reports import Hit, hit, recalls
@@ -33,8 +31,6 @@ from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Leg, Trial, shortest_path
-
-PATIENCE = 0.5  # seconds that a pool waits for a chunk to end before it lets the caller look for signals
 
 # Returns B values to keep of a moment, from what is observed and the infos of B environments, and from the actions that
 # follow; None after the last one.
@@ -97,26 +93,6 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
         keep=_poses if chunk.record else None,
     ):
         yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
-
-
-def run_whole_chunk(
-    chunk: Chunk, is_stopped: Callable[[], bool] = lambda: False
-) -> tuple[list[Result], InputError | RunError | None]:
-    """Returns the results of the episodes of a chunk, and what ended it before all of them had ended.
-
-    Errors are of the plain kinds, since what caused them need not survive the way to another process. A chunk that is
-    stopped ends without one after the step that runs.
-    """
-    ended: list[Result] = []
-    try:
-        for results in run_chunk(chunk):
-            ended += results
-            if is_stopped():
-                break
-    except (InputError, RunError) as error:
-        kinds = (UnplayableError, InputError, AgentError, RunError)
-        return ended, next(kind for kind in kinds if isinstance(error, kind))(str(error))
-    return ended, None
 
 
 def run_trials(

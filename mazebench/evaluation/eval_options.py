@@ -68,13 +68,4 @@ class RunOptions(Options):
     resume: Annotated[bool, Doc("Go on with the run in --out.")] = False
     record: Annotated[bool | None, Doc("Write trajectories too; a suite does by default.")] = None
     num_envs: Annotated[int, Ge(1), Doc("Environments side by side in each process, at most.")] = NUM_ENVS
-    workers: Annotated[int, Ge(0), Doc("Processes; 0 runs in this one, and with --ray on all its CPUs.")] = 0
-    ray: Annotated[bool, Doc("Run the workers on Ray; without an address, on this machine.")] = False
-    ray_address: Annotated[
-        str | None, Doc("Address of a Ray cluster for the workers; auto finds one that runs here.")
-    ] = None
-
-    @property
-    def cluster(self) -> str | None:
-        """The address of the Ray cluster, "local" for one on this machine; None to run without Ray."""
-        return self.ray_address or ("local" if self.ray else None)
+    workers: Annotated[int, Ge(0), Doc("Processes; 0 runs in this one.")] = 0

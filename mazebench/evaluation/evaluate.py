@@ -56,7 +56,7 @@ def evaluate(
       progress: called as episodes end, with their number and that of all.
       **options: by name, as docs/options.md and docs/evaluate.md list them: those of the evaluation (`EvalOptions`:
         episodes_per_distance, checkpoint, seed, overrides, ...), of its run (`RunOptions`: resume, record, num_envs,
-        workers, ray, ray_address), and those of `Task.of`, unless `task` is a `Task`.
+        workers), and those of `Task.of`, unless `task` is a `Task`.
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.
@@ -74,7 +74,7 @@ def evaluate(
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
     chosen = eval_options(name, task, **{key: value for key, value in options.items() if key not in of_run})
-    if (run.workers or run.cluster) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
+    if run.workers and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     return run_evaluation(chosen, out, run, progress, agent_class)
 

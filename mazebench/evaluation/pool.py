@@ -1,4 +1,4 @@
-"""Pools that run chunks: in this process, in worker processes, or on a Ray cluster."""
+"""Pools that run chunks: in this process, or in worker processes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from mazebench import stopping
-from mazebench.errors import InputError, RunError
-from mazebench.evaluation.chunk import PATIENCE, Chunk, Result, run_chunk, run_whole_chunk
+from mazebench.errors import InputError, RunError, UnplayableError
+from mazebench.evaluation.checked_agent import AgentError
+from mazebench.evaluation.chunk import Chunk, Result, run_chunk
 from mazebench.evaluation.eval_options import RunOptions
 
+_PATIENCE = 0.5  # seconds to wait for a chunk to end before the caller may look for signals
 _NO_GUARD = 86  # exit status of a worker whose script starts workers again
 _LONGEST_STEP = 10.0  # seconds that a step may take until workers are ended that were asked to stop
 
@@ -42,12 +44,7 @@ class Pool(Protocol):
 @contextlib.contextmanager
 def open_pool(run: RunOptions) -> Iterator[Pool]:
     """Yields the pool that is asked for and ends it."""
-    if run.cluster is not None:
-        from mazebench.evaluation.cluster import Cluster  # Ray is an extra
-
-        with Cluster(run.cluster, run.workers) as cluster:
-            yield cluster
-    elif run.workers:
+    if run.workers:
         with _Processes(run.workers) as processes:
             yield processes
     else:
@@ -99,7 +96,7 @@ class _Processes:
             self._processes |= set(multiprocessing.active_children()) - before
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         while waiting:
-            ended, waiting = concurrent.futures.wait(waiting, PATIENCE, concurrent.futures.FIRST_COMPLETED)
+            ended, waiting = concurrent.futures.wait(waiting, _PATIENCE, concurrent.futures.FIRST_COMPLETED)
             if stopping.is_asked():  # chunks that run end after their step
                 self._stop.set()
                 running = {future for future in waiting if not future.cancel()}
@@ -140,7 +137,21 @@ _stop: multiprocessing.synchronize.Event  # of a worker's parent
 
 
 def _run_until_stopped(chunk: Chunk) -> tuple[list[Result], InputError | RunError | None]:
-    return run_whole_chunk(chunk, _stop.is_set)
+    """Returns the results of the episodes of a chunk, and what ended it before all of them had ended.
+
+    Errors are of the plain kinds, since what caused them need not survive the way to another process. A chunk that is
+    stopped ends without one after the step that runs.
+    """
+    ended: list[Result] = []
+    try:
+        for results in run_chunk(chunk):
+            ended += results
+            if _stop.is_set():
+                break
+    except (InputError, RunError) as error:
+        kinds = (UnplayableError, InputError, AgentError, RunError)
+        return ended, next(kind for kind in kinds if isinstance(error, kind))(str(error))
+    return ended, None
 
 
 def _begin_worker(stop: multiprocessing.synchronize.Event) -> None:

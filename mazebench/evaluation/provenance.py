@@ -29,7 +29,7 @@ from mazebench.tasks.task import Task
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
-    *("opencv-python-headless", "torch", "ray"),
+    *("opencv-python-headless", "torch"),
 )
 _STANDARD, _INSTALLED = pathlib.Path(os.__file__).parent, {"site-packages", "dist-packages"}  # folders of libraries
 _OTHERS = {"__main__", "mazebench", "mazebench_agents"}  # of the modules next to an agent's file: no part of it

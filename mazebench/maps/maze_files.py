@@ -111,7 +111,7 @@ def _read_grid(path: pathlib.Path, size: int | None, options: ReadOptions) -> Oc
         raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
     if options.pixel_size is not None:
         return read_floor_plan(path, options.pixel_size)
-    grid = grid_of_image(read_picture(path), size, path.stem, options.walls)
+    grid = grid_of_image(read_picture(path), size, path.stem)
 
     # The picture may be a floor plan in which each wall is as wide as a cell.
     free = grid.states == FREE

@@ -24,14 +24,6 @@ class ReadOptions(Options):
             "pixel_size, which are coarsened to such cells, the smallest possible from 0.4."
         ),
     ] = None
-    walls: Annotated[
-        str,
-        OneOf("filled", "lines"),
-        Doc(
-            "Walls in a picture are rows of filled cells, or lines between rooms; R x C rooms become 2 R + 1 by 2 C + "
-            "1 cells."
-        ),
-    ] = "filled"
     pixel_size: Annotated[
         float | None,
         Interval(ge=0.001, le=0.5),  # so that pixels a metre are refused

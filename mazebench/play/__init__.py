@@ -1,1 +1,1 @@
-"""Driving by hand in MuJoCo's viewer, and films of episodes."""
+"""Films of episodes."""

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -73,16 +73,16 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     """
     results = []
     for path in paths:
-        if not find_evaluations([path]):
+        if not _find_evaluations([path]):
             remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
-    for folder in find_evaluations(paths):
+    for folder in _find_evaluations(paths):
         try:
             results.append(reported(load_result(folder)))
         except InputError as error:
             remark(f"{error}; skipped")
     if not results:
         where = ", ".join(map(str, paths))
-        raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
+        raise InputError(f"expected results of `mazebench eval` in {where}, found none to report")
 
     # Labels tell the training runs of an agent apart, where there are several.
     runs = pd.DataFrame([(result.label, result.run) for result in results]).groupby(0)[1].nunique()
@@ -103,10 +103,9 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
 def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
     """Returns the episodes of all results below one another.
 
-    It adds columns to those of `ReportedResult.episodes`: the `result` and the `number` of the episode in it; the
-    agent's `label` (ordered as `results`), `agent` (its name) and `run`; the `setting` (ordered), its fields and
-    perturbations, and its `mazes` in words; and numbers of the maze and of the `trial`: episodes with one maze, start,
-    goal and seed are one trial.
+    It adds columns to those of `ReportedResult.episodes`: the `result`; the agent's `label` (ordered as `results`),
+    `agent` (its name) and `run`; the `setting` (ordered), its fields and perturbations, and its `mazes` in words; and
+    numbers of the maze and of the `trial`: episodes with one maze, start, goal and seed are one trial.
     """
     labels = list(dict.fromkeys(result.label for result in results))
     settings = sorted({result.setting for result in results})
@@ -114,7 +113,6 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
         [
             result.episodes.assign(
                 result=result,
-                number=range(len(result.episodes)),
                 label=pd.Categorical([result.label] * len(result.episodes), labels, ordered=True),
                 agent=result.summary.who,
                 run=result.run,
@@ -160,20 +158,15 @@ def at_common_distances(episodes: pd.DataFrame) -> pd.DataFrame:
     return episodes[episodes.distance.isin(common)] if common else episodes
 
 
-def folders_below(paths: Iterable[pathlib.Path], is_one: Callable[[set[str]], bool]) -> list[pathlib.Path]:
-    """Returns the folders at or below `paths` whose content `is_one`, by its names; each once, and no hidden ones."""
+def _find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
+    """Returns the evaluation folders at or below `paths`, also unfinished ones; each once, and no hidden ones."""
     found: dict[pathlib.Path, pathlib.Path] = {}
     for path in paths:
         for folder, subfolders, files in os.walk(path):
-            if is_one({*subfolders, *files}):
+            if not {SUMMARY, EPISODES, JOURNAL}.isdisjoint(files):
                 found.setdefault(pathlib.Path(folder).resolve(), pathlib.Path(folder))
             subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
     return list(found.values())
-
-
-def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
-    """Returns the evaluation folders at or below `paths`, also those that are not finished."""
-    return folders_below(paths, lambda names: not names.isdisjoint({SUMMARY, EPISODES, JOURNAL}))
 
 
 def reported(result: Result) -> ReportedResult:

@@ -1,4 +1,4 @@
-"""Figures by matplotlib: curves of tables, violins of the perturbations that the paper has them of, and their files."""
+"""Figures by matplotlib: curves of tables, and their files."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
 
-from mazebench.report.episodes import at_common_distances
 from mazebench.report.table import METRICS, Table
-from mazebench.report.tables import note_on_levels, perturbed_groups
 from mazebench.results.metrics import ON_TIME_METRICS
 
-WIDTH = 7.0  # inches, of a page's text
+_WIDTH = 7.0  # inches, of a page's text
+_HEIGHT = 2.2  # inches, of a panel
 # Okabe and Ito's colours, told apart with any colour vision; without their yellow, which is faint on white, and with a
 # dark grey for their black, which is for what the paper printed.
 _PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d")
@@ -53,24 +51,13 @@ class Panel(NamedTuple):
 
     title: str
     x_name: str
-    # A line for each point: `column` (whose it is), `x` and `value`; where there are intervals also `low95` and
-    # `high95`.
+    # A line for each point: `column` (whose it is), `x` and `value`, and the interval `low95` and `high95`.
     points: pd.DataFrame
-    ticks: Mapping[float, str] = {}  # texts along the x axis; those of matplotlib if there are none
+    ticks: Mapping[float, str]  # texts along the x axis, at least one
     is_curve: bool = False  # intervals are bands, or else bars, those of several agents beside one another
-    is_score: bool = True  # values are in [0, 1]
 
 
-class Drawn(NamedTuple):
-    """A figure with its words."""
-
-    name: str  # of its files
-    title: str
-    note: str
-    figure: Figure
-
-
-def draw_table(table: Table, labels: Sequence[str]) -> Drawn:
+def draw_table(table: Table, labels: Sequence[str]) -> Figure:
     """Returns the curves of a table: success rate, on time by the first factor, and SPL.
 
     SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours.
@@ -86,28 +73,7 @@ def draw_table(table: Table, labels: Sequence[str]) -> Drawn:
         for metric, name in METRICS.items()
         if metric in metrics and len(points := single[single.metric == metric])
     ]
-    return Drawn(table.name, table.title, table.note, draw_panels(table.title, panels, labels))
-
-
-@mpl.rc_context(_STYLE)
-def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
-    """Returns violins of SPL by the strength of a perturbation, on the benchmark's eval mazes: a panel per agent."""
-    figures = []
-    for perturbation, name, group in perturbed_groups(episodes[episodes.mazes == ""]):
-        if perturbation not in ("map_flip", "position_noise"):  # of which the paper shows the distribution of SPL
-            continue
-        agents = list(at_common_distances(group).groupby("label", observed=True))
-        strength_name = perturbation.replace("_", " ")
-        title = f"SPL by {strength_name}: {group.task.iloc[0]}"
-        figure, grid, _ = _make_grid(title, [label for label, _ in agents], 2.1)
-        for axes, (_, own) in zip(grid, agents, strict=True):
-            levels, scores = zip(*own.groupby("strength").spl, strict=True)
-            places = range(len(levels))
-            axes.violinplot([each.to_numpy() for each in scores], places, widths=0.8, showmeans=True, showextrema=False)
-            _set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
-            axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05))
-        figures.append(Drawn(f"violins-{name}", title, f"{note_on_levels(perturbation, group)} Dashes: means.", figure))
-    return figures
+    return draw_panels(table.title, panels, labels)
 
 
 @mpl.rc_context(_STYLE)
@@ -115,16 +81,15 @@ def draw_panels(
     title: str,
     panels: Sequence[Panel],
     labels: Sequence[str],
-    height: float = 2.2,
     y_name: str = "",
     names: Mapping[str, str] | None = None,
 ) -> Figure:
-    """Returns panels of `height` inches in a grid, the title above, and one legend below them.
+    """Returns panels in a grid, the title above, and one legend below them.
 
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
     some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
-    figure, grid, num_columns = _make_grid(title, [panel.title for panel in panels], height)
+    figure, grid, num_columns = _make_grid(title, [panel.title for panel in panels], _HEIGHT)
     for axes, panel in zip(grid, panels, strict=True):
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
@@ -135,7 +100,7 @@ def draw_panels(
         return figure
     handles = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     lines = [name.split("\n") for name in handles]
-    columns = int(np.clip(13 * WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
+    columns = int(np.clip(13 * _WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
     # The legend makes the figure higher, and leaves the panels as they are.
     figure.set_figheight(figure.get_figheight() + 0.16 * -(-len(lines) // columns) * max(map(len, lines)))
     figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns)
@@ -163,7 +128,7 @@ def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure
     """Returns a figure, axes in it with these titles, as many beside one another as fit, and how many that is."""
     num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
     num_rows = -(-len(titles) // num_columns)
-    width = WIDTH if num_columns > 1 else WIDTH / 1.6
+    width = _WIDTH if num_columns > 1 else _WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]
     title = textwrap.fill(title, int(13 * width))
     height += 0.16 * max(text.count("\n") for text in titles)
@@ -178,24 +143,20 @@ def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:
     ours = [label for label in labels if label in set(points.column)]
     printed = [label for label in _PAPER_MARKERS if label in set(points.column)]
     step = min(np.diff(ticks), default=1.0)
-    dodge = 0.0 if panel.is_curve or not ticks else min(_DODGE, _DODGES / max(len(ours), 1)) * step
+    dodge = 0.0 if panel.is_curve else min(_DODGE, _DODGES / max(len(ours), 1)) * step
     for place, label in enumerate([*ours, *printed]):
         own, look = points[points.column == label], _look(label, labels)
         x = own.x.astype(float) + (0 if label in printed else (place - (len(ours) - 1) / 2) * dodge)
         axes.plot(x, own.value, **look, markevery=-(-len(own) // 12), label=textwrap.fill(label, 40))
-        if "low95" in own and panel.is_curve:
+        if panel.is_curve:
             axes.fill_between(x, own.low95, own.high95, color=look["color"], alpha=0.14, linewidth=0)
-        elif "low95" in own:
+        else:
             axes.vlines(x, own.low95, own.high95, color=look["color"], linewidth=0.9)
     axes.set_xlabel(panel.x_name)
-    if panel.is_score:
-        axes.set(ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
-    if ticks:
-        _set_ticks(axes, panel.ticks)
-        margin = 0.4 if panel.is_curve else step / 2
-        axes.set_xlim(ticks[0] - margin, ticks[-1] + margin)
-    else:
-        axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+    axes.set(ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
+    _set_ticks(axes, panel.ticks)
+    margin = 0.4 if panel.is_curve else step / 2
+    axes.set_xlim(ticks[0] - margin, ticks[-1] + margin)
 
 
 def _name_lines(axes: Axes, panel: Panel, labels: Sequence[str], names: Mapping[str, str]) -> None:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -18,18 +18,20 @@ import jinja2
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
 from mazebench.report.episodes import ReportedResult
-from mazebench.report.figures import Drawn, to_svg
+from mazebench.report.figures import to_svg
 from mazebench.report.table import Table
-from mazebench.report.trajectory_figures import TIME_COLORS
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
+# Without the palest yellow, which is invisible on white.
+_TIME_COLORS = mpl.colormaps["plasma"](np.linspace(0, 0.92, 32))
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
 
@@ -38,13 +40,13 @@ def build_page(
     results: Sequence[ReportedResult],
     head: str,
     tables: Sequence[Table],
-    figures: Sequence[Drawn],
+    figures: Mapping[str, Figure],
     provenance: pd.DataFrame,
     warnings: Sequence[str],
 ) -> str:
     """Returns the page as HTML; text from results is escaped in it, or stands in it as JSON and base64.
 
-    `head` describes the results in a line. A figure has the name of its table.
+    `head` describes the results in a line. `figures` are those of tables, by their names.
     """
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
@@ -54,17 +56,16 @@ def build_page(
         parts = (json.dumps(each, separators=(",", ":")) for each in (_trials(result), _outcomes(result)))
         packed = (_base64(zlib.compress(part.encode("ascii"), 9)) for part in parts)
         used.append([columns.setdefault(each, len(columns)) for each in packed])
-    # Each figure with the table of its name, then the tables that have no figure.
-    without = {table.name: table for table in tables}
-    drawn = [(each, without.pop(each.name, None), _base64(to_svg(each.figure))) for each in figures]
-    undrawn = [(table, table, "") for table in without.values()]
+    # Tables with their figures, then those without one.
+    sections = [(table, _base64(to_svg(figures[table.name]))) for table in tables if table.name in figures]
+    sections += [(table, "") for table in tables if table.name not in figures]
     return jinja2.Template(_read("page.html"), autoescape=True).render(
         style=style,
         style_hash=_hash(style),
         subtitle=head,
         warnings=warnings,
         citation="{authors}, {title}. {note}".format_map(reference()),
-        sections=[*drawn, *undrawn],
+        sections=sections,
         provenance=provenance.to_html(index=False, border=0),
         data=_explorer_data(results, used),
         columns=columns,
@@ -118,7 +119,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
         "settings": list(map(str, settings)),
         "rays": NUM_RAYS,
         "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
-        "timeColors": [mpl.colors.to_hex(color) for color in TIME_COLORS(np.linspace(0, 1, 32))],
+        "timeColors": [mpl.colors.to_hex(color) for color in _TIME_COLORS],
         "mazes": [{"name": name, "walls": walls} for name, walls in mazes],
         "results": described,
         "first": results.index(first),

@@ -11,13 +11,12 @@ import pandas as pd
 
 from mazebench.errors import InputError, remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
-from mazebench.report.figures import draw_table, draw_violins, save
+from mazebench.report.figures import draw_table, save
 from mazebench.report.page import build_page
 from mazebench.report.tables import build_tables
-from mazebench.report.trajectory_figures import draw_trajectories
 from mazebench.storage.files import make_folder, writing_to
 
-DOCUMENT, PAGE, TABLES, FIGURES = "report.md", "report.html", "tables", "figures"
+PAGE, TABLES, FIGURES = "report.html", "tables", "figures"
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")  # in provenance
 
 
@@ -43,26 +42,25 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     episodes = join_episodes(results)
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
-    figures = [draw_table(table, labels) for table in tables if table.x]
-    figures += [*draw_violins(episodes), *draw_trajectories(episodes)]
+    figures = {table.name: draw_table(table, labels) for table in tables if table.x}
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
         f"Benchmark {benchmarks}; {', '.join(labels)}; {counted(len(episodes), 'episode')} in "
         f"{counted(len(results), 'result')}."
     )
-    with new_report(out):
+    with _new_report(out):
         for table in tables:
             for suffix, text in table.to_files().items():
                 (out / TABLES / f"{table.name}{suffix}").write_bytes(text.encode(errors="replace"))
-        for drawn in figures:
-            save(drawn.figure, out / FIGURES / drawn.name)
+        for name, figure in figures.items():
+            save(figure, out / FIGURES / name)
         page = build_page(results, head, tables, figures, provenance_of(results), notes)
         (out / PAGE).write_bytes(page.encode(errors="replace"))  # names of folders need not be legal Unicode
     return results
 
 
 @contextlib.contextmanager
-def new_report(out: pathlib.Path) -> Iterator[None]:
+def _new_report(out: pathlib.Path) -> Iterator[None]:
     """Makes the folder of a report, without an earlier report's files.
 
     Raises:
@@ -70,7 +68,7 @@ def new_report(out: pathlib.Path) -> Iterator[None]:
     """
     make_folder(out)
     with writing_to(out):
-        others = sorted({path.name for path in out.iterdir()} - {DOCUMENT, PAGE, TABLES, FIGURES})
+        others = sorted({path.name for path in out.iterdir()} - {PAGE, TABLES, FIGURES})
         if others:
             raise InputError(f"{out}: expected an empty folder or a report's, found {others[0]!r} in it")
         (out / PAGE).unlink(missing_ok=True)

@@ -55,16 +55,15 @@ def played_task(summary: Summary) -> Task:
 
 
 def mazes_hash(task: Task) -> str:
-    """Returns a SHA-256 of the mazes, of fresh ones of the first, of older maps of them, and of the scenarios.
+    """Returns a SHA-256 of the mazes, of fresh ones of the first, and of older maps of them.
 
     1 m, the width of the benchmark's cells, is left out.
     """
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
     mazes = (task.mazes[0],) if task.options.fresh else task.fixed_mazes
     walls = b"".join(maze.walls.tobytes() for maze in mazes)
-    ends = b"" if task.scenarios is None else np.stack([task.scenarios.starts, task.scenarios.goals]).tobytes()
     older = b"".join(each.walls.tobytes() for each in task.shown or ())
-    return hashlib.sha256(walls + scale.encode("ascii") + ends + older).hexdigest()
+    return hashlib.sha256(walls + scale.encode("ascii") + older).hexdigest()
 
 
 def shown_of(task: Task, episode: Episode, ends: Sequence[Cell] | None = None) -> Shown:

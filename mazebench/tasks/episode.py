@@ -110,8 +110,6 @@ def _sample_episode(task: Task, rng: np.random.Generator) -> Episode:
     maze = task.mazes[index]
     if task.track is not None and isinstance(task.mazes, FreshMazes):
         TRACKS[task.track].require(maze, task.levels)
-    if task.scenarios is not None:
-        return make_episode(index, *task.scenarios.ends(rng.choice(task.scenarios.numbers(task.distances))), rng)
     start, goal = task.ends(index)
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if task.options.pairs == "fixed" else rng

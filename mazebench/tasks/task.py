@@ -15,7 +15,6 @@ from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, require_one_size
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
 from mazebench.maps.older_map import OlderMap
-from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.maps.selection import maps_in_texts
 from mazebench.options import check_names, fields_of
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
@@ -38,11 +37,10 @@ _OF_MAZES = ("task", "size", "split", "mazes", "shown", "kinds", "num_mazes", "f
 
 
 class World(NamedTuple):
-    """The mazes that a task is played in, and the maps and ends that belong to them."""
+    """The mazes that a task is played in, and the maps that belong to them."""
 
     mazes: Mazes
     shown: tuple[OlderMap, ...] | None = None  # older maps of the mazes
-    scenarios: Scenarios | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +59,6 @@ class Task:
     asked: TaskOptions = dataclasses.field(compare=False, repr=False)
     mazes: Mazes = dataclasses.field(compare=False, repr=False)  # `Episode.maze` is an index into them
     shown: tuple[OlderMap, ...] | None = dataclasses.field(compare=False, repr=False)  # instead of the mazes' own maps
-    scenarios: Scenarios | None = dataclasses.field(compare=False, repr=False)  # of a file of starts and goals
     size: int = dataclasses.field(compare=False)  # N, cells a side of all mazes
     cell_size: float = dataclasses.field(compare=False)  # m, of all mazes
     distances: tuple[int, ...] = dataclasses.field(compare=False)  # cells from start to goal
@@ -100,7 +97,7 @@ class Task:
     def replace(self, **changes: Any) -> Task:
         """Returns the task with other values of some options; the mazes are not read again unless they change."""
         of_mazes = {*_OF_MAZES, "level"} if self.changes_buildings else {*_OF_MAZES}
-        read = None if of_mazes & set(changes) else World(self.mazes, self.shown, self.scenarios)
+        read = None if of_mazes & set(changes) else World(self.mazes, self.shown)
         task = resolve(self.options.replace(**changes), read=read)
         return dataclasses.replace(task, context_size=self.context_size) if "context_size" not in changes else task
 
@@ -210,7 +207,7 @@ def resolve(
     Raises:
       InputError: if a map can't be read, or the task can't be played in a maze.
     """
-    mazes, shown, scenarios = world = read or _read(asked)
+    mazes, shown = world = read or _read(asked)
     _check_mazes(asked, world)
     size, cell_size = mazes[0].size, mazes[0].cell_size
     split, actions = asked.split or "train", asked.actions or "six"
@@ -247,7 +244,6 @@ def resolve(
         asked=asked,
         mazes=mazes,
         shown=shown,
-        scenarios=scenarios,
         size=size,
         cell_size=cell_size,
         distances=tuple(cells_of(each, cell_size, asked.track) for each in chosen),
@@ -347,15 +343,13 @@ def in_the_same_mazes(tasks: Sequence[Task], context_size: int | None = None) ->
         )
     context_size = context_size or max(task.context_size for task in tasks)
     return tuple(
-        dataclasses.replace(
-            task, context_size=context_size, mazes=tasks[0].mazes, shown=tasks[0].shown, scenarios=tasks[0].scenarios
-        )
+        dataclasses.replace(task, context_size=context_size, mazes=tasks[0].mazes, shown=tasks[0].shown)
         for task in tasks
     )
 
 
 def _read(asked: TaskOptions) -> World:
-    """Returns the mazes, loaded or drawn, with their older maps, and the scenarios in a file of these."""
+    """Returns the mazes, loaded or drawn, with their older maps."""
     size = asked.size or (SIZES[0] if asked.track is None else KINDS_SIZE)
     if asked.fresh:
         return World(FreshMazes(asked.kinds or DRAWN_KINDS[:1], size))
@@ -365,23 +359,20 @@ def _read(asked: TaskOptions) -> World:
     if asked.mazes is None:
         split = asked.split or "train"
         return World(load_mazes(size, split) if asked.track is None else load_kind_mazes(split))
-    mazes, shown, scenarios = _read_own(asked)
+    mazes, shown = _read_own(asked)
     for maze in mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")
     if shown is None and asked.track is not None:
         return _with_changes(asked, mazes)
-    return World(mazes, shown, scenarios)
+    return World(mazes, shown)
 
 
-def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...] | None, Scenarios | None]:
-    """Returns the mazes of one's own in which the task can be played, with the older maps and scenarios of these."""
+def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...] | None]:
+    """Returns the mazes of one's own in which the task can be played, with their older maps."""
     mazes, shown = asked.mazes, None
-    if are_scenarios(mazes):
-        scenarios = read_scenarios(mazes, asked.reading)
-        return (scenarios.maze,), None, scenarios
     if not isinstance(mazes, str):
-        return mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes), None
+        return mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes)
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
     if asked.shown is None:
@@ -389,7 +380,7 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
     else:
         mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
     kept = _playable(mazes, functools.partial(_check_maze, asked))
-    return tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept), None
+    return tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept)
 
 
 def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
@@ -430,14 +421,12 @@ def _changed(plan: Maze, name: str, kind: str, strength: int) -> tuple[Maze, ...
 
 def _fitting_distances(asked: TaskOptions, world: World, by_default: tuple[int, ...]) -> tuple[int, ...]:
     """Returns the distances of options that name none: on a track in metres, else in cells."""
-    mazes, shown, scenarios = world
+    mazes, shown = world
     of_track = DISTANCES if asked.track is not None else ()
     if not asked.has_own or isinstance(mazes, FreshMazes):
         return of_track or by_default
 
     # Of given ends, that between them.
-    if scenarios is not None:
-        return tuple(np.unique(scenarios.distances).tolist())
     if asked.is_hierarchical or asked.num_ends == 2:
         return tuple(sorted(set(map(asked.farthest, mazes, shown or [None] * len(mazes)))))
 
@@ -524,16 +513,8 @@ def _playable(mazes: Sequence[Maze], check: Callable[[Maze], Any]) -> list[int]:
 
 def _check_distances(options: TaskOptions, world: World) -> None:
     """Raises `InputError` if no goal of the local task is as far away in a maze as wanted."""
-    mazes, shown, scenarios = world
+    mazes, shown = world
     wanted, cell_size = options.distances or (), mazes[0].cell_size
-    if scenarios is not None:
-        if not len(scenarios.numbers(wanted)):
-            found = scenarios.distances
-            raise InputError(
-                f"{mazes[0].name}: expected distances that scenarios have, from {found.min()} to {found.max()} cells, "
-                f"found {', '.join(map(str, wanted))}"[:200]
-            )
-        return
     if options.is_hierarchical or options.num_ends == 2:
         return
     if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one

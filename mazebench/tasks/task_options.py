@@ -26,7 +26,6 @@ from mazebench.maps.maze import Cell, Maze, corner_cells
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.older_map import OlderMap
 from mazebench.maps.places import free_cell_of_place, place_text
-from mazebench.maps.scenarios import are_scenarios
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes, texts_of
 from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
@@ -48,7 +47,7 @@ MOST_GOALS = 5  # of an episode on a track, all of which its shown map keeps fre
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
-_RETIRED = (("textures", False),)  # options of earlier versions, and the values that said nothing
+_RETIRED = (("textures", False), ("walls", "filled"))  # options of earlier versions, and the values that said nothing
 # Fields that an agent may choose, or is not told, while the same is played.
 _OF_AGENTS = ("actions", "sensors", *CAMERA_OPTIONS, "hide", "exact_pose", "context_size")
 
@@ -99,10 +98,7 @@ class TaskOptions(SensorOptions, ReadOptions):
     mazes: Annotated[
         Any,
         ReadBy(_as_mazes),
-        Doc(
-            "Mazes of your own: a text, picture, array or ROS map, or a folder of them; or scenarios of MovingAI "
-            "(.scen), whose starts and goals are played on the map next to them."
-        ),
+        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them."),
     ] = None
     shown: Annotated[
         Any,
@@ -475,9 +471,8 @@ class TaskOptions(SensorOptions, ReadOptions):
             raise InputError(f"expected no num_mazes beside fresh, found {self.num_mazes}")
         if self.is_drawn and self.mazes is not None:
             raise InputError("expected mazes of your own or mazes that are drawn, found both")
-        if self.shown is not None and (self.mazes is None or are_scenarios(self.mazes)):
-            found = "none" if self.mazes is None else "scenarios"
-            raise InputError(f"shown, an older map: expected mazes of your own beside it, found {found}")
+        if self.shown is not None and self.mazes is None:
+            raise InputError("shown, an older map: expected mazes of your own beside it, found none")
         if self.is_drawn and self.split == "eval":
             raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
         for name, found in options_in(self.changed(), ReadOptions).items():
@@ -490,10 +485,6 @@ class TaskOptions(SensorOptions, ReadOptions):
             self._require(f"num_goals {self.num_goals}", task=task, pairs="random", goal=None, reward=SPARSE)
         if self.num_ends:
             self._require("a start or a goal", pairs="random")
-        if are_scenarios(self.mazes):
-            self._require("scenarios, which have starts and goals", start=None, goal=None, pairs="random", num_goals=1)
-            if self.track is not None:
-                raise InputError(f"scenarios, which have starts and goals: expected no track, found {self.track!r}")
         if self.lidar_noise is not None and LIDAR not in self.sensors:
             found = ", ".join(self.sensors) or "none"
             raise InputError(f"lidar_noise {self.lidar_noise}: expected the sensor lidar, found {found}")

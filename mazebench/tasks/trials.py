@@ -157,18 +157,12 @@ def with_later_legs(task: Task, trial: Trial, frozen: Sequence[Leg] = ()) -> Tri
 def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
 
-    Where start and goal are given, an episode draws its heading only. Of scenarios, each is one episode. Elsewhere, the
-    episodes of a maze and a distance have different starts and goals if there are so many, and the first ones do not
-    depend on `episodes_per_distance`.
+    Where start and goal are given, an episode draws its heading only. Elsewhere, the episodes of a maze and a distance
+    have different starts and goals if there are so many, and the first ones do not depend on `episodes_per_distance`.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    if task.scenarios is not None:
-        return [
-            make_trial(task.scenarios.maze, 0, task.scenarios.ends(number), np.random.default_rng([seed, number]))
-            for number in task.scenarios.numbers(task.distances).tolist()
-        ]
     trials = []
     for index, maze in enumerate(task.fixed_mazes):
         (start, goal), joined = task.ends(index), task.joined(index)

@@ -24,7 +24,6 @@ from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
-from mazebench.maps.scenarios import are_scenarios
 from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
 from mazebench.tasks.task import Task, as_options, in_the_same_mazes, resolve
@@ -289,8 +288,8 @@ def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
         raise InputError(f"expected different tracks, found {', '.join(options.task)}")
     if options.first_distance is None:
         return
-    given = [task.options for task in tasks if task.scenarios is not None or task.options.num_ends]
-    if given or any(task.options.pairs == "fixed" or task.options.is_hierarchical for task in tasks):
+    chosen = [task.options for task in tasks]
+    if any(each.num_ends or each.pairs == "fixed" or each.is_hierarchical for each in chosen):
         raise InputError("--first-distance: expected starts and goals that are drawn, found given ones")
     if options.first_distance > (farthest := max(max(task.options.distances or ()) for task in tasks)):
         raise InputError(f"expected --first-distance of at most {farthest}, the farthest goals, found more")
@@ -315,7 +314,7 @@ def training_task(
         wanted = {"split": "train", "actions": "six"}.get(name, fields_of(TaskOptions)[name].default)
         if given.get(name, wanted) != wanted:
             raise InputError(f"expected {name} {wanted!r} in a training, found {given[name]!r}")
-    has_one_goal = asked.track is not None or asked.pairs == "fixed" or are_scenarios(asked.mazes)
+    has_one_goal = asked.track is not None or asked.pairs == "fixed"
     one_goal = {"num_goals": 1} if has_one_goal or asked.reward == PROGRESS else {}
     asked = asked.replace(**{name: value for name, value in defaults.items() if name not in given} | one_goal)
     task = resolve(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))

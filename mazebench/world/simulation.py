@@ -52,10 +52,6 @@ class Simulation(abc.ABC):
         """Returns the body's heading in [-pi, pi) rad, counter-clockwise from +x."""
         return wrap_angle(float(self.data.qpos[2]))
 
-    def speed(self) -> float:
-        """Returns the body's speed in the plane in m/s."""
-        return float(np.hypot(self.data.qvel[0], self.data.qvel[1]))
-
     def state(self) -> np.ndarray:
         """Returns the state, `[12]` float64; see `states_from_sensors`, of which plain numbers take half the time."""
         x, y, z, yaw, *velocities = self.data.sensordata.tolist()

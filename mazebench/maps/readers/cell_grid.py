@@ -8,22 +8,20 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.maze import MAX_CHOSEN_SIZE
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE
 
+MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall
+_NEARLY_BEST = 0.97  # share of the best fit with which smaller numbers of cells are preferred
 # Of a cell: logarithm of width by height. A stretched picture has the same for all multiples of a grid.
 _MAX_STRETCH, _SAME_STRETCH = 0.3, 0.02
-CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whether it is wall
+_CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whether it is wall
 
 
 def fit_grid(
     across: np.ndarray,
     down: np.ndarray,
     pixels: tuple[int, ...],
-    *,
-    shortest: int,
-    longest: tuple[int, int],
     size: int | None,
-    nearly_best: float,
 ) -> tuple[tuple[int, int], float]:
     """Returns the numbers of rows and columns that fit weights along the two axes best, and the worse fit.
 
@@ -35,10 +33,7 @@ def fit_grid(
       across: weight of each position from top to bottom; `down` from left to right.
       down: see `across`.
       pixels: height and width of the picture.
-      shortest: the smallest number of cells along an axis.
-      longest: the smallest and the largest number of cells along the longer axis.
       size: the number of cells along the longer axis; estimated if None.
-      nearly_best: share of the best fit with which smaller numbers are preferred.
     """
     # The fit of each pair of numbers: the two axes' fits, weighted.
     row_fits, row_weight = _axis_fits(across)
@@ -50,19 +45,19 @@ def fit_grid(
     counts = np.arange(len(row_fits))
     stretch = np.log(np.maximum(counts, 1)[:, None] / np.maximum(counts, 1)[None, :] * pixels[1] / pixels[0])
     longer = np.maximum(counts[:, None], counts[None, :])
-    allowed = (np.abs(stretch) <= _MAX_STRETCH) & (longer >= longest[0]) & (longer <= longest[1])
-    allowed &= np.minimum(counts[:, None], counts[None, :]) >= shortest
+    allowed = (np.abs(stretch) <= _MAX_STRETCH) & (longer >= MIN_SIZE) & (longer <= MAX_CHOSEN_SIZE)
+    allowed &= np.minimum(counts[:, None], counts[None, :]) >= MIN_SIDE
     if size is not None:
         allowed &= longer == size
     fits[~allowed] = -1.0
     best = fits.max()
     if best <= 0:
-        return (longest[0], longest[0]), -1.0
+        return (MIN_SIZE, MIN_SIZE), -1.0
 
     # The smallest of the pairs that fit nearly best, better than their neighbours, and stretch cells as the best does.
     near = cv2.dilate(fits, np.ones((3, 3), np.uint8))
     as_stretched = np.abs(stretch - stretch.ravel()[fits.argmax()]) <= _SAME_STRETCH
-    rows, columns = np.nonzero((fits >= near) & (fits >= nearly_best * best) & as_stretched & allowed)
+    rows, columns = np.nonzero((fits >= near) & (fits >= _NEARLY_BEST * best) & as_stretched & allowed)
     first = int(np.argmin(rows * columns))
     num_rows, num_columns = int(rows[first]), int(columns[first])
     return (num_rows, num_columns), float(min(row_fits[num_rows], column_fits[num_columns]))
@@ -70,7 +65,7 @@ def fit_grid(
 
 def core_bounds(count: int, length: int) -> tuple[np.ndarray, np.ndarray]:
     """Returns where the middle of each of `count` cells along `length` pixels begins, and where it ends."""
-    bounds = (np.arange(count)[:, None] + [0.5 - CORE / 2, 0.5 + CORE / 2]) * length / count
+    bounds = (np.arange(count)[:, None] + [0.5 - _CORE / 2, 0.5 + _CORE / 2]) * length / count
     starts, ends = np.round(bounds).astype(int).T
     return starts, ends
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, MazeError, require_connected
+from mazebench.maps.maze import MazeError, require_connected
+from mazebench.maps.maze_options import THIN_WALLS
 from mazebench.maps.readers.cell_grid import core_bounds, fit_grid
 from mazebench.maps.readers.pixel_map import (
-    READ_LINES,
     STRAIGHTEN,
     WORKING_SIDE,
     dark_and_light,
@@ -22,7 +22,6 @@ from mazebench.maps.readers.pixel_map import (
     outer_walls,
 )
 
-MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall
 # In synthetic pictures of 13 and 21 cells the true N had a fit of 0.6 to 0.95, any other N at most 0.39.
 _MIN_FIT = 0.4
 _MIN_INK = 0.25  # share of a plan with filled walls; line drawings have less
@@ -60,8 +59,7 @@ def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
     advice = _advice(ink, size)
     across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
     down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
-    longest = (MIN_SIZE, MAX_CHOSEN_SIZE)
-    shape, fit = fit_grid(across, down, ink.shape, shortest=MIN_SIDE, longest=longest, size=size, nearly_best=0.97)
+    shape, fit = fit_grid(across, down, ink.shape, size)
     if fit < _MIN_FIT:
         raise MazeError(f"{name}: expected walls along the lines of a grid of cells, found edges off it ({advice})")
 
@@ -76,7 +74,7 @@ def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
     in_words = f"{shape[0]} x {shape[1]} cells"
     if light - dark < _MIN_CONTRAST:
         raise MazeError(
-            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; {READ_LINES}"
+            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; {THIN_WALLS}"
         )
     clarity = np.abs(cores - (dark + light) / 2) / (light - dark)
     clarity[[0, -1], :] = clarity[:, [0, -1]] = 1
@@ -105,7 +103,7 @@ def _advice(ink: np.ndarray, size: int | None) -> str:
     if size is not None:
         return f"are there {size} cells a side? {STRAIGHTEN}"
     if np.count_nonzero(ink) < _MIN_INK * ink.size:
-        return f"are the walls lines? {READ_LINES}; {STRAIGHTEN}"
+        return f"are the walls lines? {THIN_WALLS}; {STRAIGHTEN}"
     return f"give the number of cells on the longer side; {STRAIGHTEN}"
 
 

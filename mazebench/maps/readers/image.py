@@ -19,8 +19,8 @@ from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, MazeError, require_closed_border, require_connected
 from mazebench.maps.pictures import MAX_SIDE
-from mazebench.maps.readers.filled_plan import MIN_SIDE, read_plan
-from mazebench.maps.readers.line_drawing import read_lines
+from mazebench.maps.readers.cell_grid import MIN_SIDE
+from mazebench.maps.readers.filled_plan import read_plan
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from mazebench.storage.files import read_at_most
 
@@ -69,7 +69,7 @@ def _as_array(picture: PIL.Image.Image) -> np.ndarray:
     return np.asarray(picture.convert("RGBA" if is_png and picture.has_transparency_data else "RGB"))
 
 
-def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:
+def grid_of_image(image: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
     """Returns the cells that a picture of a floor plan shows; dark is wall, light or transparent is floor.
 
     Two kinds of plan can be read. In both, walls are filled and at least as thick as a cell. A plan of R x C cells that
@@ -79,14 +79,12 @@ def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) ->
     * A drawn, printed or scanned plan, on paper or cut out along its outer walls. The outer walls must form a closed,
       upright rectangle, the cells a regular grid. A photograph must be cropped, straightened and thresholded first.
 
-    With `walls="lines"`, a plan of R x C rooms is read whose walls are lines between the rooms. It becomes a maze of
-    2 R + 1 by 2 C + 1 cells. Light walls on dark paper are refused.
+    Light walls on dark paper are refused.
 
     Args:
       image: `[H, W]` gray, `[H, W, 3]` RGB or `[H, W, 4]` RGB and opacity, uint8 or uint16.
       size: N, the cells on the longer side; estimated from the drawing if None.
       name: of the maze, also in errors.
-      walls: "filled" or "lines".
 
     Raises:
       InputError: if `size` is out of range.
@@ -96,8 +94,6 @@ def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) ->
     if size is not None and not MIN_SIZE <= size <= MAX_CHOSEN_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_CHOSEN_SIZE} cells, found {size}")
     gray = to_gray(image, name)
-    if walls == "lines":
-        return _grid_of_walls(read_lines(gray, size, name), name)
     try:
         return _grid_of_filled(gray, size, name)
     except MazeError as error:
@@ -114,10 +110,8 @@ def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) ->
 
 def _grid_of_filled(gray: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
     walls = _pixel_map(gray, size)
-    return _grid_of_walls(read_plan(gray, size, name) if walls is None else walls, name)
-
-
-def _grid_of_walls(walls: np.ndarray, name: str) -> OccupancyGrid:
+    if walls is None:
+        walls = read_plan(gray, size, name)
     require_closed_border(walls, name)
     require_connected(walls, name)
     return OccupancyGrid(np.where(walls, OCCUPIED, FREE).astype(np.int8), is_cells=True)

@@ -8,10 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.maze_options import THIN_WALLS
-
 WORKING_SIDE = 2400  # pixels; larger pictures are shrunk to it
-READ_LINES = f"read them with --walls lines; {THIN_WALLS}"
 STRAIGHTEN = "crop, straighten and threshold a photograph first"
 _MIN_AREA = 0.05  # of the picture
 _MIN_FILL = 0.97  # share of the rectangle within the outline of the outer walls; less if the plan is turned by a degree

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import pathlib
 import re
+
+import numpy as np
 
 from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.maps.maze import MazeError
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
-from mazebench.maps.readers.json_map import read_json_map
 from mazebench.maps.readers.occupancy_grid import OccupancyGrid
 from mazebench.maps.readers.tables import cells_in_table, numbers_in_table, separator_of
 from mazebench.storage.files import read_at_most
+from mazebench.storage.json_files import parse_json
 
 _MAX_BYTES = 2**26  # 1,024 rows of 1,024 numbers with 18 digits take a third of it
 _ENCODINGS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
@@ -48,7 +51,7 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     """Returns the cells that a text holds: rows of characters, or of numbers as `grid_of_numbers` takes them.
 
     Of other programs, it reads MovingAI's maps, levels of DeepMind Lab and labmaze, D4RL's one line, lists of lists as
-    in Gymnasium-Robotics, tables (CSV), mazes of walls between posts, and HouseExpo's JSON.
+    in Gymnasium-Robotics, tables (CSV), mazes of walls between posts, and the grid of a JSON object.
 
     Raises:
       MazeError: if it is none of these.
@@ -58,7 +61,7 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     if text.startswith("type "):
         return _moving_ai(text, name)
     if text.lstrip().startswith("{"):
-        return read_json_map(text, name)
+        return _grid_of_json(text, name)
     if "[" in text:  # a list of rows, as Python, JSON or NumPy write it
         lines = [" ".join(row.strip("[, \n").split()) for row in text[text.find("[") : text.rfind("]")].split("]")]
         lines = lines[0].split(",") if len(list(filter(None, lines))) == 1 else lines
@@ -78,6 +81,24 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     if all(len(cell) == 1 for row in cells for cell in row):
         return grid_of_characters(["".join(row) for row in cells], name)
     return grid_of_numbers(numbers_in_table(cells, name), name)
+
+
+def _grid_of_json(text: str, name: str) -> OccupancyGrid:
+    """Returns the cells of the only list of rows of numbers in a JSON object."""
+    expected = f"{name}: expected JSON with one list of rows"
+    try:
+        content = parse_json(text)
+    except ValueError as error:
+        raise MazeError(f"{expected}, found {str(error)[:80]}") from error
+    grids = []
+    for value in content.values():
+        with contextlib.suppress(ValueError):  # of rows that differ in length
+            grids.append(np.array(value))
+    grids = [grid for grid in grids if grid.ndim == 2 and grid.dtype.kind in "bif"]
+    if len(grids) != 1:
+        hint = "; draw the plan as a picture, or write its cells as text" if "features" in content else ""  # GeoJSON
+        raise MazeError(f"{expected}, found the keys {', '.join(content)}"[:200] + hint)
+    return grid_of_numbers(grids[0], name)
 
 
 def _moving_ai(text: str, name: str) -> OccupancyGrid:
