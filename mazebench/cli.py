@@ -38,7 +38,7 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command(short_help="Make mazes: MJCF, text, picture, ROS map.")(generate)
+app.command(short_help="Make mazes: MJCF, text, picture, mesh.")(generate)
 app.command("eval", short_help="Evaluate agents on unseen mazes.")(evaluate)
 app.command(short_help="Compare two agents on the same episodes.")(compare)
 app.command(short_help="Collect demonstrations of an agent.")(collect)

@@ -152,10 +152,10 @@ class TestGenerate:
     def test_mazes_are_written_in_all_formats_and_the_first_is_shown(self, command, tmp_path):
         status, output, errors = command(
             *("generate", "--size", "9", "--count", "2", "--seed", "3"),
-            *("--out", "mine", "--format", "txt,mjcf,png"),
+            *("--out", "mine", "--format", "txt,mjcf,png,glb,obj,stl"),
         )
         assert (status, errors) == (0, "")
-        names = {f"dfs-9-3-{i:03d}.{suffix}" for i in range(2) for suffix in ("txt", "xml", "png")}
+        names = {f"dfs-9-3-{i:03d}.{suffix}" for i in range(2) for suffix in ("txt", "xml", "png", "glb", "obj", "stl")}
         assert {path.name for path in (tmp_path / "mine").iterdir()} == names
         assert all(f"mine/{name}\n" in output for name in names)
         mazes = [read_maze(tmp_path / "mine" / f"dfs-9-3-{i:03d}.txt") for i in range(2)]

@@ -33,7 +33,7 @@ TRAIN = "train --agent mah --env-steps 200 --checkpoint-steps 200 --eval-mazes 1
 TRAIN += " --set groups=4 --set steps=4 --set num_envs=8 --set min_rows=100 --set steps_per_update=32"
 COMMANDS = (
     "eval --agent planner --distances 4 --episodes-per-distance 1 --map-warp 0.2 --record",
-    "generate --size 9 --seed 3 --format txt,mjcf,png",
+    "generate --size 9 --seed 3 --format txt,mjcf,png,glb,obj,stl",
     f"{TRAIN} --set replay_capacity=4000",
 )
 # Runs each command in this process, and prints the SHA-256 of every file that is promised to be the same.
@@ -117,7 +117,7 @@ def test_files_do_not_depend_on_the_surroundings(tmp_path):
     hashes = run_commands(tmp_path / "a", SURROUNDINGS["plain"])
     names = {pathlib.Path(path).name for path in hashes}
     assert {"episodes.jsonl", "trajectories.npz", "metrics.jsonl", "agent.safetensors", "replay.npz"} <= names
-    assert {".txt", ".xml", ".png"} <= {pathlib.Path(path).suffix for path in hashes}
+    assert {".txt", ".xml", ".png", ".glb", ".obj", ".stl"} <= {pathlib.Path(path).suffix for path in hashes}
     other = run_commands(tmp_path / "b" / "ä 1", SURROUNDINGS["other"], preexec_fn=on_one_core)
     assert other == hashes
 

@@ -1,17 +1,19 @@
-"""Exports for other tools: a model that plain MuJoCo opens, and one for robots."""
+"""Exports for other tools: a watertight mesh of the walls, and a model that plain MuJoCo opens."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from mazebench.maps.covering import cover
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
-from mazebench.world.mjcf import write_mjcf
+from mazebench.world.export import write_mesh, write_mjcf
 
+# Walls that touch at a corner only: without care an edge of the mesh would have four faces.
 DIAGONAL = parse_maze("#######\n#....##\n#.#...#\n#..#..#\n#...#.#\n#.#...#\n#######", "diagonal")
 MAZES = [
     DIAGONAL,
@@ -21,6 +23,21 @@ MAZES = [
         for size in (5, 13, 21)
     ),
 ]
+
+
+@pytest.mark.parametrize("maze", MAZES, ids=lambda maze: maze.name)
+class TestMesh:
+    @pytest.mark.parametrize("suffix", ["glb", "obj", "stl"])
+    def test_the_mesh_is_watertight_and_stands_upright(self, maze, suffix, tmp_path):
+        write_mesh(maze, tmp_path / f"walls.{suffix}")
+        mesh = trimesh.load(tmp_path / f"walls.{suffix}", force="mesh")
+        assert mesh.is_watertight
+        assert mesh.is_winding_consistent
+        assert mesh.volume == pytest.approx(maze.walls.sum(), rel=0.01)
+        # glTF has y up, so the map's upper side lies at -z.
+        size = maze.size
+        bounds = [[0, 0, -size], [size, 1, 0]] if suffix == "glb" else [[0, 0, 0], [size, size, 1]]
+        np.testing.assert_allclose(mesh.bounds, bounds, atol=0.002)
 
 
 @pytest.mark.parametrize("maze", MAZES, ids=lambda maze: maze.name)

@@ -11,7 +11,7 @@ import numpy as np
 
 import mazebench
 from mazebench.maps.text import write_text_maze
-from mazebench.world.mjcf import write_mjcf
+from mazebench.world.export import write_mesh, write_mjcf
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("own"))
@@ -38,3 +38,4 @@ print(f"from {environment.task.episode.start} to {environment.task.episode.goal}
 arguments.out.mkdir(parents=True, exist_ok=True)
 write_text_maze(maze, arguments.out / "ring.txt")
 write_mjcf(maze, arguments.out / "ring.xml")  # opens in any MuJoCo tool: python -m mujoco.viewer --mjcf=ring.xml
+write_mesh(maze, arguments.out / "ring.glb")

@@ -29,8 +29,8 @@ def generate(
     ),
     formats: Annotated[
         str,
-        typer.Option("--format", help="Any of mjcf, mjcf-robot, txt, png, ros, separated by commas."),
-    ] = "txt,mjcf,png",
+        typer.Option("--format", help="Any of mjcf, mjcf-robot, txt, png, ros, glb, obj, stl, separated by commas."),
+    ] = "txt,mjcf,png,glb",
     mazes_file: Annotated[
         pathlib.Path | None,
         typer.Option("--mazes", help="A maze of your own: a picture, text, array (.npy) or ROS map (.yaml)."),
@@ -47,7 +47,7 @@ def generate(
         ),
     ] = None,
 ) -> None:
-    """Make mazes: MJCF for MuJoCo, text, picture, ROS map."""
+    """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
     load_mujoco(renders=False)
     from mazebench.maps.changes import Change, changes
     from mazebench.maps.readers.occupancy_grid import LocatedMaze

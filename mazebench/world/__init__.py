@@ -1,1 +1,1 @@
-"""A maze in MuJoCo: model, body, physics, pictures."""
+"""A maze in MuJoCo: model, body, physics, meshes, pictures."""

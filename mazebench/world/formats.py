@@ -20,7 +20,7 @@ from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.readers.ros import ROS_SUFFIXES, picture_of, write_ros_map
 from mazebench.maps.text import write_text_maze
 from mazebench.storage.files import make_folder, writing_to
-from mazebench.world.mjcf import write_mjcf
+from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf
 
 _DEFAULT_SIZE = 13
 _ROS = "ros"  # the format whose files have a frame of their own
@@ -101,4 +101,5 @@ _FORMATS: dict[str, _Format] = {
         ("png",), lambda maze, path: write_image(draw_plan(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
     ),
     _ROS: _Format(("yaml", "pgm"), write_ros_map),  # which also takes the frame of the map
+    **{name: _Format((name,), write_mesh) for name in MESH_FORMATS},
 }

@@ -7,7 +7,6 @@ docs/task.md lists.
 
 from __future__ import annotations
 
-import pathlib
 from typing import Any
 
 import mujoco
@@ -17,7 +16,6 @@ from mazebench.constants import ACTIONS, MAX_PIXELS, PHYSICS_TIMESTEP, TOP_SPEED
 from mazebench.errors import InputError
 from mazebench.maps import colors
 from mazebench.maps.maze import WALL_HEIGHT, Maze
-from mazebench.storage.files import open_whole
 from mazebench.world import looks
 
 BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
@@ -66,18 +64,6 @@ def maze_spec(maze: Maze, for_robot: bool = False) -> mujoco.MjSpec:
     spec = boxes_spec(maze, *wall_boxes(maze), for_robot)
     spec.modelname = maze.name
     return spec
-
-
-def write_mjcf(maze: Maze, path: pathlib.Path, for_robot: bool = False) -> None:
-    """Writes a model that MuJoCo opens without any other file; `for_robot`, as `maze_spec` has it.
-
-    Raises:
-      OSError: if it can't be written.
-    """
-    spec = maze_spec(maze, for_robot)
-    spec.compile()
-    with open_whole(path) as file:
-        file.write(spec.to_xml().encode("utf-8"))
 
 
 def largest_spec(maze: Maze) -> mujoco.MjSpec:
