@@ -29,7 +29,10 @@ def generate(
     ),
     formats: Annotated[
         str,
-        typer.Option("--format", help="Any of mjcf, mjcf-robot, txt, png, ros, glb, obj, stl, separated by commas."),
+        typer.Option(
+            "--format",
+            help="Any of mjcf, mjcf-textured, mjcf-robot, txt, png, ros, glb, obj, stl, separated by commas.",
+        ),
     ] = "txt,mjcf,png,glb",
     mazes_file: Annotated[
         pathlib.Path | None,

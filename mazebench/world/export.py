@@ -10,6 +10,7 @@ import trimesh
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.storage.files import open_whole
 from mazebench.world.mjcf import maze_spec, wall_boxes
+from mazebench.world.textures import add_textures
 
 MESH_FORMATS = ("glb", "obj", "stl")
 
@@ -23,13 +24,15 @@ _PILLAR_OVERHANG = 0.001
 _TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
-def write_mjcf(maze: Maze, path: pathlib.Path, for_robot: bool = False) -> None:
-    """Writes a model that MuJoCo opens without any other file; `for_robot`, one to put a robot into.
+def write_mjcf(maze: Maze, path: pathlib.Path, textures: bool = False, for_robot: bool = False) -> None:
+    """Writes a model that MuJoCo opens without any other file; with `textures`, or to put a robot into.
 
     Raises:
       OSError: if it can't be written.
     """
     spec = maze_spec(maze, for_robot)
+    if textures:
+        add_textures(spec, maze)
     spec.compile()
     with open_whole(path) as file:
         file.write(spec.to_xml().encode("utf-8"))

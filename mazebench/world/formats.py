@@ -96,6 +96,7 @@ def write_maze(
 _FORMATS: dict[str, _Format] = {
     "txt": _Format(("txt",), write_text_maze),
     "mjcf": _Format(("xml",), write_mjcf),
+    "mjcf-textured": _Format(("textured.xml",), functools.partial(write_mjcf, textures=True)),
     "mjcf-robot": _Format(("robot.xml",), functools.partial(write_mjcf, for_robot=True)),
     "png": _Format(
         ("png",), lambda maze, path: write_image(draw_plan(maze, max(1, _PICTURE_PIXELS // maze.size)), path)

@@ -85,9 +85,9 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
     """Returns a look, "plain" or "varied", of a maze; if `is_unseen`, with patterns that training mazes don't have."""
     if look == PLAIN:
         return _plain_look(maze)
-    rng = np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+    rng = rng_of(maze)
 
-    surfaces = _regions_of(maze, NUM_SURFACES, rng)
+    surfaces = regions_of(maze, NUM_SURFACES, rng)
     signs = np.where(rng.random(maze.walls.shape) < _SIGN_SHARE, -rng.choice(_SIGNS, maze.walls.shape), -1)
 
     # Two colours for each of them, of any hue but the goal's.
@@ -111,7 +111,12 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
     )
 
 
-def _regions_of(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:
+def rng_of(maze: Maze) -> np.random.Generator:
+    """Returns a generator of what is drawn from a hash of the walls."""
+    return np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+
+
+def regions_of(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:
     """Returns a number below `count` for each cell, `[N, N]` int, the same in a square region of a few cells."""
     regions = rng.integers(count, size=(maze.size // _CELLS_PER_REGION + 1,) * 2)
     return np.kron(regions, np.ones((_CELLS_PER_REGION,) * 2, dtype=int))[: maze.size, : maze.size]
