@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.kinds.kind import largest_area
-from mazebench.maps.maze import Maze, MazeError
+from mazebench.maps.maze import Maze
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze
@@ -82,7 +82,7 @@ def test_drawing_marks_start_goal_and_path_when_given(maze):
     assert (image[5, 5] == draw_maze(maze, 16)[5, 5]).all()
 
 
-@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg", ".pgm", ".ppm", ".tif", ".webp", ".gif"])
+@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg", ".pgm", ".ppm", ".tif", ".webp"])
 @pytest.mark.parametrize("cell_pixels", [8, 16])
 def test_map_is_read_from_each_format(maze, tmp_path, extension, cell_pixels):
     path = tmp_path / f"plan{extension}"
@@ -140,39 +140,11 @@ def test_rectangular_pixel_map_is_padded_and_never_distorted(rows, columns, num_
 
 
 @pytest.mark.parametrize("shade", [(255, 0, 0), (0, 0, 255), (0, 160, 0), (255, 200, 0)])
-@pytest.mark.parametrize("margin", [0, 30])
-def test_cells_in_colour_are_floor(maze, shade, margin):
+def test_cells_in_colour_are_floor(maze, shade):
     image = np.dstack([blocks(maze.walls, 20)] * 3)
     row, column = maze.free_cells[5] * 20
     image[row : row + 20, column : column + 20] = shade
-    assert maze_from_image(np.pad(image, ((margin,) * 2, (margin,) * 2, (0, 0)), constant_values=255)) == maze
-
-
-def scan(walls: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The plan on gray paper, upright: its cells are of no whole number of pixels, blurred and noisy, a JPEG."""
-    image = np.pad(blocks(walls, 24), 40, constant_values=255)
-    image = cv2.resize(image, None, fx=0.83, fy=0.83, interpolation=cv2.INTER_AREA)
-    image = cv2.GaussianBlur(40 + 0.7 * image, (0, 0), 1.2) + rng.normal(0, 6, image.shape)
-    content = encode(np.clip(image, 0, 255).astype(np.uint8), ".jpg")
-    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE)
-
-
-@pytest.mark.parametrize(("kind", "rows", "columns"), [("dfs", 9, 15), ("obstacles", 21, 13), ("dfs", 21, 21)])
-def test_a_scan_of_a_maze_is_read_with_and_without_the_size(kind, rows, columns):
-    rng = np.random.default_rng(rows)
-    walls = generate(kind, max(rows, columns), rng).walls[:rows, :columns].copy()
-    walls[[0, -1]] = walls[:, [0, -1]] = True
-    walls = largest_area(walls)
-    image = scan(walls, rng)
-    assert maze_from_image(image) == padded(walls)
-    assert maze_from_image(image, max(rows, columns)) == padded(walls)
-
-
-def test_a_plan_that_is_turned_is_refused(maze):
-    image = np.pad(blocks(maze.walls[[*range(6), -1]], 16), 40, constant_values=255)
-    turn = cv2.getRotationMatrix2D((image.shape[1] / 2, image.shape[0] / 2), 1.5, 1)
-    with pytest.raises(MazeError, match="expected a drawing whose dark outer walls form a closed, upright rectangle"):
-        maze_from_image(cv2.warpAffine(image, turn, image.shape[::-1], borderValue=255))
+    assert maze_from_image(image) == maze
 
 
 def test_a_jpeg_is_turned_upright_when_the_camera_was_held_sideways(maze):
@@ -182,34 +154,8 @@ def test_a_jpeg_is_turned_upright_when_the_camera_was_held_sideways(maze):
     assert read_bytes(content[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + content[2:]) == maze
 
 
-def test_a_plan_is_read_when_the_paper_is_squared_and_cells_have_letters(maze):
-    image = np.pad(blocks(maze.walls, 24), 96, constant_values=255)
-    faint = np.full_like(image, 255)
-    faint[::24] = faint[:, ::24] = 215
-    image = np.minimum(image, faint)
-    for letter, (row, column) in zip("SG", maze.free_cells[[0, -1]], strict=True):
-        corner = (96 + 24 * int(column) + 6, 96 + 24 * int(row) + 18)
-        cv2.putText(image, letter, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 0, 1)
-    assert maze_from_image(image) == maze
-
-
-def thin_line_plan(num_cells: int, cell_pixels: int, line: int, frame: int, blur: float) -> np.ndarray:
-    """Rooms between lines, a door in each, inside a frame, on paper."""
-    side, margin = num_cells * cell_pixels, 40
-    image = np.full((side + 2 * margin,) * 2, 255, dtype=np.uint8)
-    for row in range(num_cells):
-        for column in range(num_cells - 1):
-            x, top = margin + (column + 1) * cell_pixels, margin + row * cell_pixels
-            if (row + column) % 3:
-                cv2.line(image, (x, top), (x, top + cell_pixels), 0, line)
-                cv2.line(image, (top, x), (top + cell_pixels, x), 0, line)
-    cv2.rectangle(image, (margin, margin), (margin + side, margin + side), 0, frame)
-    return cv2.GaussianBlur(image, (0, 0), blur) if blur else image
-
-
 MAZE = generate("dfs", 13, np.random.default_rng(0))
-PAGE = "m: expected dark walls on light paper, found a page of one shade"
-INVERTED = "m: expected dark walls on a light ground, found light ones on a dark ground; invert"
+NOT_READ = "m: expected dark walls on a light ground and each cell as a block of pixels"
 NOISE = np.random.default_rng(0).integers(0, 256, (120, 90, 3), dtype=np.uint8)
 
 
@@ -219,60 +165,16 @@ def with_open_border() -> np.ndarray:
     return blocks(walls, 16)
 
 
-def with_pocket() -> np.ndarray:
-    walls = MAZE.walls.copy()
-    walls[1:4, 1:4] = True
-    walls[1, 1] = False
-    return scan(walls, np.random.default_rng(0))
-
-
-def with_cell_half_filled() -> np.ndarray:
-    image = blocks(MAZE.walls, 24)
-    row, column = MAZE.free_cells[7] * 24
-    image[row : row + 24, column : column + 12] = 0
-    return cv2.GaussianBlur(np.pad(image, 100, constant_values=250), (0, 0), 1)
-
-
-def with_line_across_the_floor() -> np.ndarray:
-    """On the border of cells (1, 1) and (1, 2)."""
-    image = np.pad(blocks(MAZE.walls, 24), 100, constant_values=250)
-    image[124:148, 148:150] = 0
-    return image
-
-
 @pytest.mark.parametrize(
     ("image", "options", "message"),
     [
-        (np.zeros((50, 50), np.uint8), {}, PAGE),
-        (255 - blocks(MAZE.walls, 16), {}, INVERTED),
-        (255 - np.pad(blocks(MAZE.walls, 16), 40, constant_values=255), {}, INVERTED),
-        (NOISE, {}, "expected"),
-        (255 - cv2.circle(np.zeros((200, 200), np.uint8), (100, 100), 80, 255, -1), {}, "expected"),
+        (np.zeros((50, 50), np.uint8), {}, NOT_READ),
+        (255 - blocks(MAZE.walls, 16), {}, NOT_READ),
+        (np.pad(blocks(MAZE.walls, 16), 40, constant_values=255), {}, "a drawn or scanned plan needs --pixel-size"),
+        (NOISE, {}, NOT_READ),
         (with_open_border(), {}, r"expected a closed border, found cell \(0, 3\) free"),
-        (blocks(MAZE.walls, 1), {"size": 9}, "are there 9 cells a side"),
-        *(
-            (scan(MAZE.walls, np.random.default_rng(0)), {"size": size}, f"are there {size} cells a side")
-            for size in (12, 14)
-        ),
+        (blocks(MAZE.walls, 1), {"size": 9}, "9 cells on the longer side"),
         *((blocks(MAZE.walls, 8), {"size": size}, f"size of 5 to 255 cells, found {size}") for size in (4, 256)),
-        (with_pocket(), {}, r"cell \(\d+, \d+\) cannot be reached from \(1, 1\) \(give the number of cells"),
-        (
-            with_cell_half_filled(),
-            {},
-            r"13 x 13 cells of wall or floor, found cell \({0[0]}, {0[1]}\) between".format(MAZE.free_cells[7]),
-        ),
-        (with_line_across_the_floor(), {}, r"found a thin line across the floor at \(1, [12]\)"),
-        (
-            thin_line_plan(8, 40, 2, 2, 0),
-            {},
-            "filled walls as thick as a cell, found only lines between 8 x 8 cells; a floor plan with thin walls",
-        ),
-        (
-            thin_line_plan(12, 30, 3, 3, 0),
-            {},
-            r"\(are the walls lines\? a floor plan with thin walls needs --pixel-size",
-        ),
-        (thin_line_plan(8, 24, 1, 8, 1.2), {}, "expected"),
     ],
 )
 def test_a_picture_that_is_not_read_gets_a_line_that_helps(image, options, message):

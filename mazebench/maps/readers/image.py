@@ -1,4 +1,4 @@
-"""Mazes in pictures: drawings of this package, pixel maps, plans.
+"""Mazes in pictures in which each cell is a block of pixels, as drawings of this package are.
 
 `H` and `W` are the numbers of rows and columns of a picture, `N` of cells along a side of the maze. Row 0 is on top.
 """
@@ -19,15 +19,13 @@ from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, MazeError, require_closed_border, require_connected
 from mazebench.maps.pictures import MAX_SIDE
-from mazebench.maps.readers.cell_grid import MIN_SIDE
-from mazebench.maps.readers.filled_plan import read_plan
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
 _MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing of this package
 _FORMATS = ("PNG", "JPEG", "BMP", "GIF", "PPM", "TIFF", "WEBP")
-_MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
+_MIN_SIDE = 3  # cells on the shorter side: wall, floor, wall
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
@@ -70,48 +68,29 @@ def _as_array(picture: PIL.Image.Image) -> np.ndarray:
 
 
 def grid_of_image(image: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
-    """Returns the cells that a picture of a floor plan shows; dark is wall, light or transparent is floor.
+    """Returns the cells of a pixel map, in which each cell is a block of k x k pixels, k >= 1; dark is wall.
 
-    Two kinds of plan can be read. In both, walls are filled and at least as thick as a cell. A plan of R x C cells that
-    is not square is padded with wall, see `locate_maze`. Marks in colour on a plan with gray walls are floor.
-
-    * A pixel map, in which each cell is a block of k x k pixels, k >= 1. It is read exactly.
-    * A drawn, printed or scanned plan, on paper or cut out along its outer walls. The outer walls must form a closed,
-      upright rectangle, the cells a regular grid. A photograph must be cropped, straightened and thresholded first.
-
-    Light walls on dark paper are refused.
+    A map of R x C cells that is not square is padded with wall, see `locate_maze`. Marks in colour on a map with gray
+    walls are floor, and so is what is transparent.
 
     Args:
       image: `[H, W]` gray, `[H, W, 3]` RGB or `[H, W, 4]` RGB and opacity, uint8 or uint16.
-      size: N, the cells on the longer side; estimated from the drawing if None.
+      size: N, the cells on the longer side; by default, the largest blocks of one shade are cells.
       name: of the maze, also in errors.
 
     Raises:
       InputError: if `size` is out of range.
-      MazeError: if no legal maze is found. Nothing is repaired, except that the outer cells of a plan on paper are
-        always walls.
+      MazeError: if it is no pixel map of a legal maze.
     """
     if size is not None and not MIN_SIZE <= size <= MAX_CHOSEN_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_CHOSEN_SIZE} cells, found {size}")
-    gray = to_gray(image, name)
-    try:
-        return _grid_of_filled(gray, size, name)
-    except MazeError as error:
-        if np.mean(gray < 128) < _MIN_DARK:
-            raise
-        try:
-            _grid_of_filled(255 - gray, size, name)
-        except MazeError:
-            raise error from None
-        raise MazeError(
-            f"{name}: expected dark walls on a light ground, found light ones on a dark ground; invert the picture"
-        ) from error
-
-
-def _grid_of_filled(gray: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
-    walls = _pixel_map(gray, size)
+    walls = _pixel_map(to_gray(image, name), size)
     if walls is None:
-        walls = read_plan(gray, size, name)
+        raise MazeError(
+            f"{name}: expected dark walls on a light ground and each cell as a block of pixels"
+            f"{'' if size is None else f', {size} cells on the longer side'}; a drawn or scanned plan needs "
+            "--pixel-size, its metres a pixel"
+        )
     require_closed_border(walls, name)
     require_connected(walls, name)
     return OccupancyGrid(np.where(walls, OCCUPIED, FREE).astype(np.int8), is_cells=True)
@@ -126,8 +105,8 @@ def to_gray(image: np.ndarray, name: str) -> np.ndarray:
     shape = image.shape
     if not (len(shape) == 2 or shape[2:] in ((3,), (4,))) or image.dtype not in (np.uint8, np.uint16):
         raise MazeError(f"{name}: expected a gray, RGB or RGBA picture of uint8 or uint16, found {shape} {image.dtype}")
-    if min(shape[:2]) < MIN_SIDE or max(shape[:2]) < MIN_SIZE:
-        raise MazeError(f"{name}: expected at least {MIN_SIZE} x {MIN_SIDE} pixels, found {shape[1]} x {shape[0]}")
+    if min(shape[:2]) < _MIN_SIDE or max(shape[:2]) < MIN_SIZE:
+        raise MazeError(f"{name}: expected at least {MIN_SIZE} x {_MIN_SIDE} pixels, found {shape[1]} x {shape[0]}")
     if image.dtype == np.uint16:
         image = (image >> 8).astype(np.uint8)
     if len(shape) == 2:
@@ -170,7 +149,7 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
         not MIN_SIZE <= num_cells <= MAX_CHOSEN_SIZE
         or cell * num_cells != longer
         or block % cell
-        or shorter < MIN_SIDE * cell
+        or shorter < _MIN_SIDE * cell
     ):
         return None
     if block == 1 and len(shades) > _MAX_MAP_SHADES:
