@@ -125,33 +125,9 @@ class TestReading:
         ):
             read(tmp_path, rows)
 
-    @pytest.mark.parametrize(
-        "table",
-        [
-            "1,1,1,1,1\n1,,,1,1\n1,1,,1,1\n1,1,,,1\n1,1,1,1,1\n",
-            "1;1;1;1;1;;\n1;;;1;1;;\n1;1;;1;1;;\n1;1;;;1;;\n1;1;1;1;1;;\n;;;;;;\n",
-            "1\t1\t1\t1\t1\t\n1\t\t\t1\t1\t\n1\t1\t\t1\t1\n1\t1\t\t\t1\n1\t1\t1\t1\t1\n\t\t\t\t\n",
-            "#\t#\t#\t#\t#\n#\t\t\t#\t#\n#\t#\t\t#\t#\n#\t#\t\t\t#\n#\t#\t#\t#\t#\n",
-        ],
-    )
-    def test_an_empty_field_is_free_where_walls_alone_are_marked(self, table, tmp_path):
-        assert read(tmp_path, table, "plan.csv") == parse_maze(PLAN)
-
-    @pytest.mark.parametrize("separator", ["\t", ",", ";"])
-    def test_a_row_of_empty_fields_is_a_row(self, separator, tmp_path):
-        table = separator.join("11111") + "\n" + 4 * separator + "\n" + separator.join("11111")
-        assert (~read(tmp_path, table, "plan.csv").walls).sum() == 5
-
-    @pytest.mark.parametrize(("wall", "free"), [("1,0", "0,0"), ("100,0", "0,0"), ("TRUE", "FALSE"), ("true", "false")])
-    @pytest.mark.parametrize("separator", [";", "\t"])
-    def test_numbers_and_truth_values_of_spreadsheets_are_read(self, wall, free, separator, tmp_path):
-        lines = [separator.join(wall if letter == "#" else free for letter in row) for row in PLAN.split()]
-        assert read(tmp_path, "\n".join(lines), "plan.csv") == parse_maze(PLAN)
-
     @given(walls=arrays(bool, (5, 7)), separator=st.sampled_from(",;\t"), quote=st.sampled_from(["", '"']))
     def test_a_table_is_the_array_that_was_written(self, walls, separator, quote):
-        decimals = ",0" if quote else ""
-        table = "\n".join(separator.join(f"{quote}{int(cell)}{decimals}{quote}" for cell in row) for row in walls)
+        table = "\n".join(separator.join(f"{quote}{int(cell)}{quote}" for cell in row) for row in walls)
         np.testing.assert_array_equal(grid_of_text(table, "m").states, np.where(walls, OCCUPIED, FREE))
 
     def test_characters_of_double_width_and_squares_are_read(self, tmp_path):
@@ -185,12 +161,8 @@ class TestRefusal:
             ('{"grid": ' + "[" * 100_000, "expected JSON with one list of rows"),
             ("1,0,1\n1,,1\n1,1,1\n", r"expected a value in each field, found none at \(1, 1\)$"),
             ("1,0,1\n1,0\n1,1,1\n", r"expected 3 fields in each row, found 2 in row 1$"),
-            ("0.0,1.0,2.0\n1,0,1\n1,1,1\n", r"found 0.0, 1.0, 2.0, ... in row 0, a header or an index"),
             ("#####\n#,,,#\n#,,,#\n#,,,#\n#####\n", r"found ',' at \(1, 1\)$"),
-            ("A,B,C\n1,0,1\n1,1,1\n", r"found A, B, C, ... in row 0, a header"),
-            ("1,0,1\n2,0,1\n3,1,1\n", r"found 1, 2, 3, ... in column 0, a header"),
             ("1;0;1\n1;wall;1\n1;1;1\n", r"cells of one character, found 'wall' at \(1, 1\)$"),
-            ("0,9;0,1;0,9\n0,9;0,1;0,9\n", "found float64 with the values 0.1, 0.9"),
             ("####\n#..#\n####\n", r"^plan: expected 5 to \d+ cells a side, found 4$"),
             (b"\xff\xff\xff", "found byte 0xff at 0; text, pictures such as PNG"),
             (b"AB\0", "found byte 0x00 at 2; text, pictures such as PNG"),

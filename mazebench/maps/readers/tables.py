@@ -1,18 +1,15 @@
-"""Tables of cells, as spreadsheets and programs write them: fields between commas, semicolons or tabs."""
+"""Tables of cells: fields between commas, semicolons or tabs."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 
 import numpy as np
 
 from mazebench.maps.maze import MazeError
-from mazebench.maps.readers.cells import WALL
 
-_SEPARATORS = "\t;,"  # a comma may be the decimal mark between the others
-_BOOLEANS = {"true": 1.0, "false": 0.0}
-_ONLY_WALLS = {*WALL, "1.0", "100", "100.0", "true"}  # marks beside which an empty field is free
+_SEPARATORS = "\t;,"
+_BOOLEANS = {"True": 1.0, "False": 0.0}
 
 
 def separator_of(lines: Sequence[str]) -> str | None:
@@ -25,36 +22,15 @@ def separator_of(lines: Sequence[str]) -> str | None:
 
 
 def cells_in_table(lines: Sequence[str], separator: str, name: str) -> list[list[str]]:
-    """Returns the fields of each row, without empty ones at the ends. One that is empty among walls alone is "0".
+    """Returns the fields of each row.
 
     Raises:
-      MazeError: if rows differ in their number of fields, a field is empty, or there is a header or an index.
+      MazeError: if rows differ in their number of fields, or a field is empty.
     """
-    try:
-        rows = [
-            next(csv.reader([line], delimiter=separator, skipinitialspace=True)) for line in lines if line.strip(" ")
-        ]
-    except csv.Error as error:
-        raise MazeError(f"{name}: expected a table of cells, found {error}") from error
-    table = [[field.strip(" \"'") for field in row] for row in rows]
-
-    # Spreadsheets add empty fields and rows at the end.
-    while table and not any(table[-1]):
-        table.pop()
-    if not table:
-        raise MazeError(f"{name}: expected a table of cells, found empty fields only")
-    width = max(number + 1 for row in table for number, field in enumerate(row) if field)
+    table = [[field.strip(" \"'") for field in line.split(separator)] for line in lines if line.strip()]
     for number, row in enumerate(table):
-        if len(row) < width:
-            raise MazeError(f"{name}: expected {width} fields in each row, found {len(row)} in row {number}")
-    # A comma within a field is the decimal mark.
-    table = [[field.replace(",", ".") for field in row[:width]] for row in table]
-    _require_no_labels(table, name)
-
-    marks = {field.lower() for row in table for field in row if field}
-    if marks <= _ONLY_WALLS:
-        return [[field or "0" for field in row] for row in table]
-    for number, row in enumerate(table):
+        if len(row) != len(table[0]):
+            raise MazeError(f"{name}: expected {len(table[0])} fields in each row, found {len(row)} in row {number}")
         if "" in row:
             raise MazeError(f"{name}: expected a value in each field, found none at ({number}, {row.index('')})")
     return table
@@ -70,26 +46,10 @@ def numbers_in_table(cells: Sequence[Sequence[str]], name: str) -> np.ndarray:
     for row, fields in enumerate(cells):
         for column, field in enumerate(fields):
             try:
-                value = _BOOLEANS.get(field.lower())
-                numbers[row, column] = float(field) if value is None else value
+                numbers[row, column] = _BOOLEANS[field] if field in _BOOLEANS else float(field)
             except ValueError as error:
                 raise MazeError(
                     f"{name}: expected rows of as many numbers, or cells of one character, "
                     f"found {field[:60]!r} at ({row}, {column})"
                 ) from error
     return numbers
-
-
-def _require_no_labels(table: Sequence[Sequence[str]], name: str) -> None:
-    """Raises `MazeError` if the first row or column counts, or has different words or letters."""
-    for kind, fields in (("row 0", list(table[0])), ("column 0", [row[0] for row in table])):
-        labels = fields[1:] if fields[0] == "" else fields
-        is_count = [label.removesuffix(".0") for label in labels] in (
-            [str(first + number) for number in range(len(labels))] for first in (0, 1)
-        )
-        are_words = len(set(labels)) == len(labels) and all(label[:1].isalpha() for label in labels)
-        if len(labels) > 2 and (is_count or are_words):
-            raise MazeError(
-                f"{name}: expected cells, found {', '.join(labels[:3])[:60]}, ... in {kind}, a header or an index; "
-                "leave it out, as to_csv(header=False, index=False) does"
-            )
