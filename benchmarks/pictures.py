@@ -6,16 +6,16 @@ other episodes are in train mazes, or in mazes of no split.
 
 from __future__ import annotations
 
+import io
 import pathlib
 import tempfile
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mazebench_agents.neural_planner import NeuralPlanner
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 import mazebench
 from mazebench.agent import Inputs
@@ -25,78 +25,131 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps import colors
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
-from mazebench.maps.maze import Cell, Maze
-from mazebench.maps.pictures import draw_grid, write_image
-from mazebench.play.film import _run
+from mazebench.maps.maze import Cell, Maze, path_through_walls
+from mazebench.maps.pictures import draw_grid, draw_rays
+from mazebench.play.film import run_episode
 from mazebench.report.page import lay_on_first_pose
 from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import resolve, resolve_in
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.ray_casting import ray_ends
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "images"
 HOUSE = 17  # index of the train maze
+BLOCKED = 27  # likewise, with a closed door on the path on the map
 DISTANCE = 40  # cells from start to goal
-PIXELS = 17  # of a cell
+PIXELS, NEAR_PIXELS = 17, 40  # of a cell
+NEAR = 4 * NEAR_PIXELS  # the lidar's 3.5 m and a little more
 MOVED = "#e8871e"  # the colour of marks at doors that have moved
 DRIVEN = "#d1495b"
+MIDWAY = "#c850a0"  # of the middle of a path in a drawing of a maze
+PLANNED = "#7b2cbf"  # of the shortest path on the map, and of the door that closes it
+ODOMETRY = "#0b7a8a"
 
+OBSERVED = 6  # seed of the episode
 FILMED = 94  # the episode: the navigator finds a door closed and drives around
-VIEWS = {"map": "map given; rings: moved doors", "lidar": "real building, lidar and path", "egocentric": "robot's view"}
-SIDE, GAP, TITLE = 256, 12, 26  # pixels; three views and two gaps are 792 wide
+VIEWS = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
+SIDE, GAP, TITLE, LEGEND = 256, 12, 32, 70  # pixels; three views and four gaps are 816 wide
 FRAME_TIME = 80  # ms: twice as fast as the robot
-THUMBNAIL = 248  # pixels a side
 
 
 def film() -> None:
-    """Films an episode in three views, with a ring around each door that has moved."""
-    options = eval_options("navigator", task="rebuilt", level=2, split="dev", seed=FILMED)
-    views = [_run(options, view, SIDE, is_film=True)[0] for view in VIEWS]
-    plan = make_plan(options)
+    """Films an episode in three views, with the path on the map and marks at the doors that have moved."""
+    plan = make_plan(eval_options("navigator", task="rebuilt", level=2, split="dev", seed=FILMED))
+    views = [run_episode(plan, FILMED, view, SIDE, is_film=True)[0] for view in VIEWS]
     episode = plan.trials[FILMED].episode
-    walls = plan.task.mazes[episode.maze].walls
-    moved = np.argwhere(shown_of(plan.task, episode).walls != walls)
+    maze, seen = plan.task.mazes[episode.maze], show_map(plan.task, episode)
 
-    # All frames are a copy of one canvas with the titles.
-    width = len(VIEWS) * (SIDE + GAP) - GAP
-    canvas = Image.new("RGB", (width, TITLE + SIDE), "white")
-    for index, title in enumerate(VIEWS.values()):
-        centre = index * (SIDE + GAP) + SIDE / 2, TITLE / 2
-        ImageDraw.Draw(canvas).text(centre, title, "#222222", ImageFont.load_default(15), anchor="mm")
+    # All frames have the same titles, marks and legend before them.
+    width, height = len(VIEWS) * (SIDE + GAP) + GAP, TITLE + SIDE + LEGEND
+    figure = Figure(figsize=(width / 100, height / 100))
+    places = [(GAP + index * (SIDE + GAP), TITLE) for index in range(len(VIEWS))]
+    panels = [figure.add_axes((x / width, LEGEND / height, SIDE / width, SIDE / height)) for x, _ in places]
+    for axes, title in zip(panels, VIEWS.values(), strict=True):
+        axes.set(xlim=(0, maze.size), ylim=(0, maze.size))
+        axes.set_title(title, fontsize=14)
+        axes.set_axis_off()
+    _annotate(*panels[:2], maze, seen, episode.start, episode.goal)
+    figure.savefig(file := io.BytesIO(), transparent=True)
+    marks = Image.open(file)
     frames = []
     for moment in zip(*views, strict=True):
-        frame = canvas.copy()
-        for index, (view, picture) in enumerate(zip(VIEWS, moment, strict=True)):
-            for row, column in moved if view != "egocentric" else ():
-                place = tuple(int((each + 0.5) * SIDE / len(walls)) for each in (column, row))
-                cv2.circle(picture, place, 7, tuple(bytes.fromhex(MOVED[1:])), 2, cv2.LINE_AA)
-            frame.paste(Image.fromarray(picture), (index * (SIDE + GAP), TITLE))
+        frame = Image.new("RGB", (width, height), "white")
+        for place, picture in zip(places, moment, strict=True):
+            frame.paste(Image.fromarray(picture), place)
+        frame.paste(marks, mask=marks)
         frames.append(frame)
 
     # One palette for all frames, so that what stands still is stored once.
-    swatches = [[colors.to_bytes(colors.START)], [colors.to_bytes(colors.GOAL)], [tuple(bytes.fromhex(MOVED[1:]))]] * 40
+    shades = [MOVED, PLANNED, MIDWAY, colors.to_hex(colors.START), colors.to_hex(colors.GOAL)]
+    swatches = np.array([[list(bytes.fromhex(shade[1:]))] for shade in shades * 40], dtype=np.uint8)
     some = [np.asarray(frame) for frame in frames[:: len(frames) // 6]]
-    palette = Image.fromarray(np.concatenate([*some, np.repeat(swatches, width, axis=1).astype(np.uint8)]))
-    palette = palette.quantize(128)
+    palette = Image.fromarray(np.concatenate([*some, np.repeat(swatches, width, axis=1)])).quantize(110)
     first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     durations = [FRAME_TIME] * len(rest) + [2000]
     first.save(FOLDER / "rebuilt.gif", save_all=True, append_images=rest, duration=durations, loop=0, optimize=True)
 
 
 def draw_environments() -> None:
-    """Draws for each environment the map that is shown, and the oracle's path in the maze."""
-    tracks = {name: {"task": name, "level": 2, "distances": DISTANCE} for name in TRACKS}
+    """Draws for each environment the map that is shown, and the oracle's path in the building."""
+    levels = {name: 3 if name == "building" else 2 for name in TRACKS}  # building 3 is turned and mirrored
+    tracks = {name: {"task": name, "level": levels[name], "distances": DISTANCE} for name in TRACKS}
     tasks: dict[str, dict[str, Any]] = {"local": {"distances": 12}, "hierarchical": {"task": "hierarchical"}}
     for name, options in (tracks | tasks).items():
-        maze = load_kind_mazes("train")[HOUSE] if name in TRACKS else load_mazes(13, "train")[0]
+        maze = load_kind_mazes("train")[BLOCKED] if name in TRACKS else load_mazes(13, "train")[0]
         played = play(maze, split="train", **options)
-        pictures = (_shown_map(played.shown), _maze_and_path(played))
-        shown, driven = (cv2.resize(each, (THUMBNAIL, THUMBNAIL), interpolation=cv2.INTER_AREA) for each in pictures)
-        gap = np.full((THUMBNAIL, GAP, 3), 255, np.uint8)
-        write_image(np.concatenate([shown, gap, driven], axis=1), FOLDER / "environments" / f"{name}.png")
+        figure = Figure(figsize=(7.4, 4.95), layout="constrained")
+        on_map, on_maze = figure.subplots(1, 2)
+        side = len(played.seen.seen_walls)
+        _show(on_map, _shown_map(played.shown), f"{name}: the map that is shown", 14, extent=(0, side, 0, side))
+        _show(
+            on_maze, _maze_and_path(played), "the building, the oracle's path", 14, extent=(0, maze.size, 0, maze.size)
+        )
+        if played.observed is not None:
+            on_maze.plot(*played.observed[:, :2].T, "--", color=ODOMETRY, lw=2, label="path by odometry")
+        _annotate(on_map, on_maze, maze, played.seen, played.start, played.goal)
+        figure.savefig(FOLDER / "environments" / f"{name}.png", dpi=100, metadata={"Software": None})
+
+
+def draw_observation() -> None:
+    """Draws what the agent observes in a moment of `rebuilt` 2, with a camera besides the lidar."""
+    env = mazebench.make("rebuilt", level=2, sensors=("lidar", "egocentric"))
+    env.reset(seed=OBSERVED)
+    for _ in range(4):
+        observation, *_, info = env.step(0)
+    maze, pose = env.unwrapped.task.mazes[info["maze"]], np.append(info["position"], info["yaw"])
+    shown, around, goal, start = observation["context"]
+
+    marks = np.full((*goal.shape, 3), 230, dtype=np.uint8)
+    marks[goal == 1], marks[start == 1] = colors.to_bytes(colors.GOAL), colors.to_bytes(colors.START)
+    rays = draw_grid(maze.walls, NEAR_PIXELS)
+    draw_rays(rays, NEAR_PIXELS, pose[:2], ray_ends(pose, observation["lidar"]))
+    pictures = {
+        "context[0]: the map": 1 - shown,
+        "context[1]: around the start": 1 - around,
+        "context[2], [3]: goal, start": marks,
+        "lidar: 32 distances": rays,
+        "egocentric: 64 x 64 pixels": observation["egocentric"],
+    }
+    figure = Figure(figsize=(8, 5.7), layout="constrained")
+    *panels, last = figure.subplots(2, 3).flat
+    for axes, (title, picture) in zip(panels, pictures.items(), strict=True):
+        _show(axes, picture, title, 13, cmap="gray", interpolation="nearest")
+    x, y = NEAR_PIXELS * pose[0], NEAR_PIXELS * (maze.size - pose[1])
+    panels[3].set(xlim=(x - NEAR, x + NEAR), ylim=(y + NEAR, y - NEAR))
+
+    groups = ("position x, y, z in m", "roll, pitch, yaw in rad", "velocity in m/s", "turning in rad/s")
+    state = zip(groups, (observation["state"].reshape(4, 3) + 0.0).tolist(), strict=True)
+    text = "\n\n".join(f"{group}\n" + "   ".join(f"{number:.2f}" for number in numbers) for group, numbers in state)
+    _show(last, np.ones((1, 1, 3)), "state: 12 numbers", 13, extent=(0, 1, 0, 1))
+    last.text(0, 0.98, text, fontsize=13, va="top", linespacing=1.2)
+    figure.savefig(FOLDER / "observation.png", dpi=100, metadata={"Software": None})
 
 
 def draw_tracks() -> None:
@@ -106,18 +159,15 @@ def draw_tracks() -> None:
     for row, track in zip(figure.subplots(len(TRACKS), 1 + len(LEVELS)), TRACKS, strict=True):
         for level in LEVELS:
             played = play(maze, split="train", task=track, level=level, distances=DISTANCE)
-            _show(row[level], _shown_map(played.shown), f"{track} {level}")
+            _show(row[level], _shown_map(played.shown), f"{track} {level}", 13, extent=2 * (0, maze.size))
             if track == "rebuilt":
-                # A cross where a door is closed, a ring where it is open.
-                for cell in np.argwhere(played.shown.walls != maze.walls):
-                    marker = "x" if maze.walls[tuple(cell)] else "o"
-                    row[level].plot(*(PIXELS * (cell[::-1] + 0.5)), marker, color=MOVED, markersize=5, fillstyle="none")
+                for doors, marker in ((maze.walls & ~played.seen.walls, "x"), (played.seen.walls & ~maze.walls, "o")):
+                    row[level].plot(*maze.point(np.argwhere(doors)).T, marker, color=MOVED, ms=5, fillstyle="none")
             if track == "adrift":
-                looks = ({"color": "#888888"}, {"color": DRIVEN, "ls": "--"})
-                for path, look in zip((played.pose, played.observed), looks, strict=True):
-                    row[level].plot(PIXELS * path[:, 0], PIXELS * (maze.size - path[:, 1]), linewidth=1.2, **look)
-                row[level].set(xlim=(0, PIXELS * maze.size), ylim=(PIXELS * maze.size, 0))
-        _show(row[0], _maze_and_path(played), "the maze, and a path")
+                row[level].plot(*played.pose[:, :2].T, color="#888888", lw=1.2)
+                row[level].plot(*played.observed[:, :2].T, "--", color=DRIVEN, lw=1.2)
+                row[level].set(xlim=(0, maze.size), ylim=(0, maze.size))
+        _show(row[0], _maze_and_path(played), "the maze, a path", 13)
     figure.savefig(FOLDER / "tracks.png", dpi=110, metadata={"Software": None})
 
 
@@ -141,6 +191,7 @@ class Played(NamedTuple):
     pose: np.ndarray  # [T, 3] float
     observed: np.ndarray | None  # [T, 3] float, the pose by odometry where the track has it, laid on the first true one
     shown: Shown
+    seen: ShownMap
 
 
 def play(maze: Maze | None, agent: str = "oracle", **options: Any) -> Played:
@@ -153,8 +204,9 @@ def play(maze: Maze | None, agent: str = "oracle", **options: Any) -> Played:
     task, trajectory = resolve(result.summary.task), trajectories[record.episode]
     observed = None if trajectory.observed is None else lay_on_first_pose(trajectory)
     index = [each.name for each in task.mazes].index(record.maze)
-    shown = shown_of(task, Episode(index, record.start, record.goal, float(trajectory.pose[0, 2]), record.seed))
-    return Played(task.mazes[index], record.start, record.goal, trajectory.pose.astype(float), observed, shown)
+    episode = Episode(index, record.start, record.goal, float(trajectory.pose[0, 2]), record.seed)
+    shown, seen, pose = shown_of(task, episode), show_map(task, episode), trajectory.pose.astype(float)
+    return Played(task.mazes[index], record.start, record.goal, pose, observed, shown, seen)
 
 
 def draw_planner() -> None:
@@ -219,12 +271,34 @@ def _maze_and_path(played: Played) -> np.ndarray:
     return draw_grid(maze.walls, 31 * PIXELS // maze.size, played.start, played.goal, played.pose[:, :2])
 
 
-def _show(axes: Axes, picture: np.ndarray, title: str, **look: str) -> None:
+def _annotate(on_map: Axes, on_maze: Axes, maze: Maze, seen: ShownMap, start: Cell, goal: Cell) -> None:
+    """Adds to pictures of a shown map and of its maze the path on the map, the doors that moved, and a legend."""
+    for label, color in (("start", colors.START), ("goal", colors.GOAL)):
+        on_map.plot([], [], "o", color=color, label=label)
+    path = path_through_walls(seen.walls, start, goal)
+    on_map.plot(*seen.seen_points(maze.point(np.array(path))).T, "--", lw=2, color=PLANNED, label="path on the map")
+
+    closed, on_path = maze.walls & ~seen.walls, np.zeros_like(maze.walls)
+    on_path[tuple(np.transpose(path))] = True
+    marks = {
+        "blocking door": ("x", PLANNED, closed & on_path),
+        "other closed doors": ("x", MOVED, closed & ~on_path),
+        "opened doors": ("o", MOVED, seen.walls & ~maze.walls),
+    }
+    for label, (marker, shade, doors) in marks.items():
+        if doors.any():
+            points, look = maze.point(np.argwhere(doors)), {"ls": "", "ms": 7, "mew": 2, "fillstyle": "none"}
+            on_maze.plot(*points.T, marker, color=shade, label=label, **look)
+            on_map.plot(*seen.seen_points(points).T, marker, color=shade, **look)
+    on_map.figure.legend(loc="outside lower left", ncols=3, fontsize=13, frameon=False, handlelength=1.5)
+
+
+def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **look: Any) -> None:
     axes.imshow(picture, **({"interpolation": "antialiased"} | look))
-    axes.set_title(title, fontsize=8)
+    axes.set_title(title, fontsize=fontsize)
     axes.set_axis_off()
 
 
 if __name__ == "__main__":
-    for draw in (film, draw_environments, draw_tracks, draw_kinds, draw_planner, draw_changes):
+    for draw in (film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes):
         draw()

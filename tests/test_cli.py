@@ -5,13 +5,14 @@ from __future__ import annotations
 import inspect
 import json
 import pathlib
+import shutil
 
 import cv2
 import numpy as np
 import pytest
 import typer
 from processes import run_python
-from run_folders import FILES, IMPORTS, files_of, summary_of
+from run_folders import FILES, IMPORTS, files_of, records_of, summary_of
 
 from mazebench import __version__, cli
 from mazebench.agent_loading import agent_names
@@ -50,6 +51,8 @@ def one_line(run: tuple[int, str, str], status: int = 2) -> str:
     return errors
 
 
+AGAIN = ("render", "--out", "x.png", "--view", "map", "--episode", "0", "--results")
+
 # One of each kind of fault.
 BAD_INPUT = [
     (("--frobnicate",), "No such option"),
@@ -69,6 +72,9 @@ BAD_INPUT = [
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
     ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
     (("render", "--out", "film.avi"), "unknown suffix '.avi'; available: .gif, .mp4, .png"),
+    (("render", "--out", "x.png", "--results", "{bad}"), "expected --results and --episode together, found one"),
+    ((*AGAIN, "{bad}"), "expected a finished evaluation, found 'binary.png' in it"),
+    ((*AGAIN, "{bad}", "--level", "2"), "--results has an agent and options of its own; found --level"),
 ]
 
 
@@ -269,6 +275,25 @@ class TestRender:
         np.testing.assert_array_equal((without < 60).all(axis=2)[centres], (rays < 60).all(axis=2)[centres])
         blue_on_floor = (rays[..., 0] > rays[..., 2] + 20) & (without.min(axis=2) > 250)
         assert 0 < blue_on_floor.mean() < 0.5
+
+    def test_an_episode_of_results_is_run_again(self, command, planner_run, tmp_path):
+        record = records_of(planner_run)[3]
+        options = ("--results", planner_run, "--episode", "3", "--view", "map", "--out", "x.png")
+        status, text, errors = command("render", *options)
+        assert (status, errors) == (0, "")
+        driven = f"reached the goal after {record['steps']} steps and {record['path_length']:.2f} m"
+        assert text.startswith(f"x.png: planner {driven}")
+        assert f"in maze {record['maze']}, from ({record['start'][0]}, {record['start'][1]}) to" in text
+        said = "expected an episode from 0 to 39, found 40"
+        assert said in one_line(command(*AGAIN[:-2], "40", "--results", planner_run))
+
+    def test_an_episode_that_ends_otherwise_than_its_record_is_told(self, command, planner_run, tmp_path):
+        shutil.copytree(planner_run, tmp_path / "changed")
+        records = records_of(planner_run)
+        lines = (json.dumps({**record, "steps": record["steps"] + 1}) + "\n" for record in records)
+        (tmp_path / "changed" / "episodes.jsonl").write_text("".join(lines))
+        said = f"found True after {records[0]['steps']}; the agent's code is the same"
+        assert said in one_line(command(*AGAIN, "changed"), status=0)
 
     def test_views_are_rendered_without_a_display(self, tmp_path):
         arguments = ("-m", "mazebench", *self.ARGUMENTS, "--out", "x.png")

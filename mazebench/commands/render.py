@@ -9,11 +9,14 @@ import typer
 
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options, watched_task
+from mazebench.errors import InputError
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.options import options_in
+from mazebench.results.reading import load_result
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
 
+_AGENT = "planner-closed-loop"
 _DRAWN = ("map", "lidar", "depth", "labels")  # views that need no rendering, and those of the sensors
 
 
@@ -21,7 +24,11 @@ _DRAWN = ("map", "lidar", "depth", "labels")  # views that need no rendering, an
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
-    agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
+    agent: Annotated[str | None, typer.Option(help=f"Who drives; {_AGENT} if not given.")] = None,
+    results: Annotated[
+        pathlib.Path | None, typer.Option(help="A finished evaluation: its agent runs --episode of it again.")
+    ] = None,
+    episode: Annotated[int | None, typer.Option(min=0, help="Number of an episode in --results.")] = None,
     view: Annotated[
         str,
         typer.Option(
@@ -32,9 +39,18 @@ def render(
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
-    options = EvalOptions(agent=agent, task=watched_task(values).options, **options_in(values, EvalOptions))
-    load_mujoco(renders=view not in (*_DRAWN, *values.get("sensors", ())))
+    if (results is None) != (episode is None):
+        raise InputError("expected --results and --episode together, found one of them")
+    if results and (chosen := [*values.keys() - {"checkpoint", "overrides"}, *(["agent"] if agent else [])]):
+        raise InputError(f"--results has an agent and options of its own; found --{min(chosen).replace('_', '-')}")
+    result = load_result(results) if results else None
+    task = result.summary.task if result else watched_task(values).options
+    load_mujoco(renders=view not in (*_DRAWN, *task.sensors))
     from mazebench.play import film
 
-    outcome = film.film_episode(options, out, view, pixels)
+    if result and episode is not None:
+        outcome = film.film_result(result, episode, out, view, pixels, **values)
+    else:
+        options = EvalOptions(agent=agent or _AGENT, task=task, **options_in(values, EvalOptions))
+        outcome = film.film_episode(options, out, view, pixels)
     print(f"{out}: {outcome}")

@@ -7,19 +7,23 @@ import dataclasses
 import pathlib
 import tempfile
 from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mazebench.constants import STEP_TIME
+from mazebench.constants import FROZEN_PER_MAZE, STEP_TIME
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.evaluation.plan import build_agent, make_plan
+from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
+from mazebench.results.played import played_task
+from mazebench.results.reading import CONFIG, Result
 from mazebench.rollout import agent_seed, rollout
 from mazebench.storage.files import make_folder, open_whole, writing_to
+from mazebench.storage.json_files import read_json
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
@@ -32,6 +36,14 @@ from mazebench.world.rendering import CAMERAS, Cameras
 MAP = "map"
 _CODEC = "vp09"  # VP9, which browsers play
 _FRAMES_PER_SECOND = 1 / STEP_TIME  # one an agent step: the film runs in real time
+
+
+class Outcome(NamedTuple):
+    """What came of an episode."""
+
+    success: bool
+    steps: int
+    words: str  # a line that tells both, the path and the place
 
 
 def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int) -> str:
@@ -51,25 +63,69 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
       InputError: if a name is unknown or `out` can't be written.
       RenderingError: if this machine can't render.
     """
+    plan = make_plan(options)
+    return _film(plan, options.seed % len(plan.trials), out, view, pixels).words
+
+
+def film_result(result: Result, number: int, out: pathlib.Path, view: str, pixels: int, **chosen: Any) -> str:
+    """Runs the episode `number` of a finished evaluation again, and writes it as `film_episode` does.
+
+    A `mazebench.errors.Remark` warns if success or steps are not those of the record. `chosen` has `checkpoint`, that
+    of the evaluation unless it is the shipped one, and `overrides`, further values of the agent's config.
+
+    Raises:
+      InputError: also if there is no such episode, or the mazes or the checkpoint are not those of the evaluation.
+    """
+    folder, summary, origin = result.folder, result.summary, result.summary.provenance
+    if summary.task.num_goals > 1:
+        raise InputError(f"{folder}: expected results with one goal per episode, found {summary.task.num_goals} goals")
+    if not number < summary.episodes:
+        raise InputError(f"{folder}: expected an episode from 0 to {summary.episodes - 1}, found {number}")
+    played_task(summary)  # refuses mazes that were changed
+
+    # The evaluation's plan.
+    options = EvalOptions(
+        agent=summary.agent,
+        task=summary.task,
+        episodes_per_distance=origin.episodes_per_distance,
+        episodes_per_maze=read_json(folder / CONFIG).get("episodes_per_maze", FROZEN_PER_MAZE),
+        seed=origin.seed,
+        **chosen,
+    )
+    plan = make_plan(options.replace(overrides={**summary.config, **options.overrides}))
+    expected, found = (str(each.checkpoint_sha256)[:8] for each in (origin, plan.provenance))
+    if found != expected:
+        raise InputError(f"{folder}: expected the checkpoint with SHA-256 {expected}, found {found}; use --checkpoint")
+
+    outcome, record = _film(plan, number, out, view, pixels), result.records[number]
+    if outcome[:2] != (record.success, record.steps):
+        code = "the same" if plan.provenance.agent_code_sha256 == origin.agent_code_sha256 else "changed"
+        remark(
+            f"{folder}: episode {number}: expected success {record.success} after {record.steps} steps, as recorded, "
+            f"found {outcome.success} after {outcome.steps}; the agent's code is {code}"
+        )
+    return outcome.words
+
+
+def _film(plan: Plan, number: int, out: pathlib.Path, view: str, pixels: int) -> Outcome:
+    """Runs an episode of a plan and writes it to `out`."""
     if view not in (every := (MAP, *{**dict.fromkeys(CAMERAS), **SENSORS}, "all")):
         raise unknown("view", view, every)
     if out.suffix not in _WRITERS:
         raise unknown("suffix", out.suffix, _WRITERS)
     out = out.absolute()  # agents may change the working folder
-    frames, outcome = _run(options, view, pixels, is_film=out.suffix != ".png")
+    frames, outcome = run_episode(plan, number, view, pixels, is_film=out.suffix != ".png")
     make_folder(out.parent)
     with writing_to(out):
         _WRITERS[out.suffix](frames, out)
     return outcome
 
 
-def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[list[np.ndarray], str]:
-    """Runs the episode; returns a picture of each of its moments, or of the last one alone, and what came of it."""
-    plan = make_plan(options)
+def run_episode(plan: Plan, number: int, view: str, pixels: int, is_film: bool) -> tuple[list[np.ndarray], Outcome]:
+    """Runs an episode of a plan; returns a picture of each of its moments, or of the last one, and its outcome."""
     if view in SENSORS and view not in (*CAMERAS, *plan.task.sensors):
         raise InputError(f"view {view!r}: expected a task with this sensor; add --sensors {view}")
     views = (MAP, *dict.fromkeys((*CAMERAS, *plan.task.sensors))) if view == "all" else (view,)
-    number = options.seed % len(plan.trials)
     trial = plan.trials[number]
     episode = trial.episode
     maze = plan.task.mazes[episode.maze]
@@ -85,7 +141,7 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
                 agent,
                 envs,
                 first,
-                lambda _: [agent_seed(options.seed, number)],
+                lambda _: [agent_seed(plan.options.seed, number)],
                 needs_truth=plan.agent_class.needs_truth,
             )
             for step in steps:
@@ -97,9 +153,11 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     info = {name: values[0] for name, values in step.next_info.items()}
 
     ending = "reached the goal" if info["success"] else "ran out of time"
-    return frames, (
-        f"{options.agent} {ending} after {info['steps']} steps and {info['path_length']:.2f} m "
-        f"(shortest {trial.shortest_path:.2f} m) in maze {maze.name}, from {episode.start} to {episode.goal}"
+    return frames, Outcome(
+        bool(info["success"]),
+        int(info["steps"]),
+        f"{plan.options.agent} {ending} after {info['steps']} steps and {info['path_length']:.2f} m "
+        f"(shortest {trial.shortest_path:.2f} m) in maze {maze.name}, from {episode.start} to {episode.goal}",
     )
 
 
