@@ -128,7 +128,8 @@ class Examples:
         marker = np.array([_marker(example.map[1]) for example in chosen])
         gain, noise_at = np.ones(count, np.float32), np.full(count, -1)
         if look == VARIED:
-            gain = np.exp(rng.uniform(*np.log(EXPOSURES), count)).astype(np.float32)
+            darkest, brightest = np.log(EXPOSURES)
+            gain = np.exp(rng.uniform(darkest, brightest, count)).astype(np.float32)
             noise_at = rng.integers(NUM_NOISE, size=count)
         maze = np.repeat([example.maze for example in chosen], num_states)
         pose = np.concatenate([example.pose for example in chosen])
