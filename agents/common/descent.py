@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -78,6 +79,11 @@ class Descent:
             state.setdefault(int(index), {})[moment] = value
         groups = self._optimizer.state_dict()["param_groups"]
         self._optimizer.load_state_dict({"state": state, "param_groups": groups})
+
+
+def cosine(share: float) -> float:
+    """Returns the factor of a learning rate after a share of a training, from 1 to 0.02 (Loshchilov & Hutter 2017)."""
+    return max(0.02, 0.5 * (1 + math.cos(math.pi * share)))
 
 
 def in_numbers(scalars: Mapping[str, torch.Tensor]) -> dict[str, Any]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -47,6 +47,19 @@ class MapEncoder(nn.Module):
         for layer in self.layers:
             features = features + functional.relu(layer(features))
         return features
+
+
+def ring_points(radii: Sequence[float], num_angles: int) -> torch.Tensor:
+    """Returns points ahead of a body and to its left, `[P, 2]`: the body, then those of rings around it."""
+    angles = [number * 2 * math.pi / num_angles for number in range(num_angles)]
+    rings = [(radius * math.cos(angle), radius * math.sin(angle)) for radius in radii for angle in angles]
+    return torch.tensor([(0.0, 0.0), *rings])
+
+
+def without_exposure(colors: torch.Tensor) -> torch.Tensor:
+    """Returns the colours of pictures `[B, 3, H, W]` from 0 to 1 with mean 0 and deviation 1 in each picture."""
+    deviation, mean = torch.std_mean(colors, dim=(1, 2, 3), keepdim=True)
+    return (colors - mean) / (deviation + 0.02)
 
 
 def marked_position(plane: torch.Tensor) -> torch.Tensor:

@@ -6,7 +6,6 @@ python -m mazebench_agents.map_policy.cloning --out map-policy.safetensors
 from __future__ import annotations
 
 import argparse
-import math
 import pathlib
 import time
 from collections.abc import Iterator
@@ -14,18 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from torch import nn
 from torch.nn import functional
 
 from mazebench.constants import NUM_ACTIONS
+from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.task import Task
-from mazebench.world.looks import EXPOSURES, LOOKS, NUM_NOISE, VARIED, Camera
+from mazebench.world.looks import LOOKS, PLAIN, VARIED, Camera, exposures_of
 from mazebench.world.ray_camera import RayCamera
 
 from ..common.actor import one_torch_thread
 from ..common.checkpoint import save_checkpoint
+from ..common.descent import Descent, cosine
 from ..common.symmetry import NUM_SYMMETRIES, turn_actions, turn_planes
 from ..robot.body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP
+from ..robot.cells import marked_cell
 from ..robot.motion import moved
 from ..robot.quickest import costs_of_actions, make_course
 from .map_policy import NAME
@@ -72,7 +73,7 @@ class Examples:
             self._pool[self._oldest] = example
             self._oldest = (self._oldest + 1) % len(self._pool)
         chosen = [self._pool[index] for index in self._rng.integers(len(self._pool), size=_MAPS)]
-        pictures = self._pictures(chosen, VARIED if self._rng.random() < 0.5 else LOOKS[0])
+        pictures = self._pictures(chosen, VARIED if self._rng.random() < 0.5 else PLAIN)
 
         # Each map is turned or mirrored, as if the drives had been in another maze.
         rows = [
@@ -100,9 +101,7 @@ class Examples:
         starts = cells[np.abs(distance - wanted[:, None]).argmin(axis=1)]
 
         # Where the bodies are, how fast, and the costs of what they can do.
-        pose = np.column_stack(
-            [starts[:, 1] + 0.5, len(walls) - 0.5 - starts[:, 0], rng.uniform(-np.pi, np.pi, _DRIVES)]
-        )
+        pose = np.column_stack([cell_to_point(starts, len(walls)), rng.uniform(-np.pi, np.pi, _DRIVES)])
         velocity = np.zeros((_DRIVES, 2))
         same = [np.repeat(values[None], _DRIVES, axis=0) for values in (course.walls, course.way_left)]
         goals = np.full((_DRIVES, 2), (course.goal_x, course.goal_y))
@@ -125,23 +124,16 @@ class Examples:
         """Returns `[G, K, 64, 64, 3]` uint8 of examples, in a look."""
         rng, num_states = self._rng, _DRIVES * _STEPS
         count = len(chosen) * num_states
-        marker = np.array([_marker(example.map[1]) for example in chosen])
+        goals = [marked_cell(example.map[1]) for example in chosen]
+        marker = np.pad(cell_to_point(np.array(goals), chosen[0].map.shape[-1]), ((0, 0), (0, 1)))  # on the floor
         gain, noise_at = np.ones(count, np.float32), np.full(count, -1)
         if look == VARIED:
-            darkest, brightest = np.log(EXPOSURES)
-            gain = np.exp(rng.uniform(darkest, brightest, count)).astype(np.float32)
-            noise_at = rng.integers(NUM_NOISE, size=count)
+            gain, noise_at = exposures_of(rng, count)
         maze = np.repeat([example.maze for example in chosen], num_states)
         pose = np.concatenate([example.pose for example in chosen])
         marker = np.repeat(marker, num_states, axis=0)
         taken = self._cameras[look].take(("egocentric",), maze, pose, marker, gain, noise_at)["egocentric"]
         return taken.reshape(len(chosen), num_states, *taken.shape[1:])
-
-
-def _marker(goal: np.ndarray) -> tuple[float, float, float]:
-    """Returns where the goal's disc is, for a plane `[L, L]` that marks its cell."""
-    row, column = np.unravel_index(goal.argmax(), goal.shape)
-    return float(column) + 0.5, len(goal) - 0.5 - float(row), 0.0
 
 
 def _turned(example: Example, pictures: np.ndarray, symmetry: int) -> tuple[torch.Tensor, ...]:
@@ -165,19 +157,18 @@ def train(minutes: float, seed: int) -> Iterator[tuple[MapNetwork, str]]:
     """Yields the network and a line on its progress, some times a minute, for some minutes of CPU."""
     torch.manual_seed(seed)
     examples, network = Examples(seed), MapNetwork()
-    optimizer = torch.optim.Adam(network.parameters(), _RATE)
     begin, update, share, losses, right = time.process_time(), 0, 0.0, [], []
+    descent = Descent(
+        network,
+        torch.optim.Adam(network.parameters(), _RATE),
+        max_gradient_norm=_MAX_GRADIENT,
+        rate=lambda update: min(1.0, update / _FIRST_UPDATES) * cosine(share),
+    )
     while share < 1:
-        rate = _RATE * min(1.0, (update + 1) / _FIRST_UPDATES) * max(0.02, 0.5 * (1 + math.cos(math.pi * share)))
-        for group in optimizer.param_groups:
-            group["lr"] = rate
         maps, pose, velocity, pictures, labels = examples.batch()
         logits = network(network.read(maps), pose, velocity, pictures)
         loss = functional.cross_entropy(logits.flatten(0, 1), labels.flatten(0, 1))
-        optimizer.zero_grad()
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
-        optimizer.step()
+        descent.step(loss)
         update += 1
         losses.append(loss.item())
         right.append((logits.argmax(-1) == labels.argmax(-1)).float().mean().item())

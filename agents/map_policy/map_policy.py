@@ -33,7 +33,7 @@ _STATES_AT_ONCE = 32
 
 @dataclasses.dataclass
 class _Robot:
-    """What the agent keeps of one environment."""
+    """Reading and noise of one environment."""
 
     noise: np.random.Generator  # of its choice of actions
     features: torch.Tensor = dataclasses.field(init=False)  # [C + 1, L, L], what was read of the map
@@ -44,7 +44,6 @@ class MapPolicy(Agent):
 
     needs_sensors = ("egocentric",)
     needs_shown = ("map", "goal")
-    learns = True
 
     def __init__(self, network: MapNetwork, cell_size: float):
         """Acts by a network, in mazes with cells of `cell_size` (m)."""

@@ -6,28 +6,19 @@ cells. A pose is x, y and yaw (rad), with x to the right, y up and the map's low
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import nn
 from torch.nn import functional
 
 from mazebench.constants import NUM_ACTIONS, TOP_SPEED
 
+from ..common.layers import ring_points, without_exposure
+
 _CHANNELS = 16
 _STEPS = 40  # of reading; what a cell knows travels a cell a step
 _HIDDEN = 256
 _NUM_SEEN = 64  # features of a picture
-_RADII = (0.5, 1.0, 1.7, 2.5)  # cells, of rings of points around the body
-_ANGLES = 8  # points of a ring
-_POINTS = torch.tensor(  # [33, 2], the body, then points ahead of it and to its left
-    [(0.0, 0.0)]
-    + [
-        (radius * math.cos(angle * 2 * math.pi / _ANGLES), radius * math.sin(angle * 2 * math.pi / _ANGLES))
-        for radius in _RADII
-        for angle in range(_ANGLES)
-    ]
-)
+_POINTS = ring_points((0.5, 1.0, 1.7, 2.5), 8)  # [33, 2], cells
 
 
 class MapNetwork(nn.Module):
@@ -76,11 +67,8 @@ class MapNetwork(nn.Module):
         points = torch.stack([columns, rows], dim=-1) * (2 / size) - 1  # [G, K, 33, 2]
         near = functional.grid_sample(features, points, padding_mode="border", align_corners=False)
 
-        # Whatever the exposure of a picture is.
         colors = functional.avg_pool2d(pictures.flatten(0, 1).movedim(-1, 1) / 255, 2)
-        deviation, mean = torch.std_mean(colors, dim=(1, 2, 3), keepdim=True)
-        seen = self.eye((colors - mean) / (deviation + 0.02)).unflatten(0, pose.shape[:2])
-
+        seen = self.eye(without_exposure(colors)).unflatten(0, pose.shape[:2])
         speed = torch.linalg.vector_norm(velocity, dim=-1, keepdim=True)
         motion = torch.cat([velocity, speed], dim=-1) / TOP_SPEED
         return self.policy(torch.cat([near.movedim(1, 2).flatten(2), seen, motion], dim=-1))

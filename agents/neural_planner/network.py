@@ -6,7 +6,6 @@ cells. A pose is x, y and yaw (rad), with x to the right, y up and the grid's lo
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,21 +14,13 @@ from torch import nn
 
 from mazebench.constants import NUM_ACTIONS, TOP_SPEED
 
+from ..common.layers import ring_points
 from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
 from ..robot.beams import MOST_EVIDENCE
 
 NUM_RANGES = 32  # to the walls around the body
 REACH = 3.5  # cells, of these ranges
-_RADII = (0.4, 0.8, 1.2, 1.8, 2.5, REACH)  # cells, of rings of points around the body
-_ANGLES = 16  # points of a ring
-_POINTS = torch.tensor(  # [P, 2], the body, then points ahead of it and to its left
-    [(0.0, 0.0)]
-    + [
-        (radius * math.cos(angle * 2 * math.pi / _ANGLES), radius * math.sin(angle * 2 * math.pi / _ANGLES))
-        for radius in _RADII
-        for angle in range(_ANGLES)
-    ]
-)
+_POINTS = ring_points((0.4, 0.8, 1.2, 1.8, 2.5, REACH), 16)  # [97, 2], cells
 _NUM_MOTION = 3 + 2 * NUM_ACTIONS
 _NUM_FEATURES = 3 * len(_POINTS) + NUM_RANGES + _NUM_MOTION + 2
 

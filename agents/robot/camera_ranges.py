@@ -18,7 +18,7 @@ from mazebench.world.looks import Camera
 
 from ..common.actor import one_torch_thread
 from ..common.checkpoint import load_checkpoint, load_into
-from ..common.layers import in_batches
+from ..common.layers import in_batches, without_exposure
 from .beams import Beams
 
 NUM_RAYS = 96  # round the body
@@ -69,9 +69,7 @@ class RangeNetwork(nn.Module):
 
         The inverse has Laplace's distribution.
         """
-        colors = pictures.movedim(-1, 1) / 255
-        deviation, mean = torch.std_mean(colors, dim=(1, 2, 3), keepdim=True)
-        colors = (colors - mean) / (deviation + 0.02)  # whatever the exposure is
+        colors = without_exposure(pictures.movedim(-1, 1) / 255)
         planes = torch.cat([colors, self.places.expand(len(colors), -1, -1, -1)], dim=1)
         inverse, scale = self.columns(self.picture(planes).flatten(1, 2)).split(self._num_rays, dim=1)
         return torch.stack([inverse + 0.6, scale.clamp(-6, 2) - 1], dim=1)

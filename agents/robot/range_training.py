@@ -13,20 +13,18 @@ from collections.abc import Iterator
 
 import numpy as np
 import torch
-from torch import nn
 
 from mazebench.maps.drawn import Mazes
 from mazebench.tasks.task import Task
 from mazebench.world.looks import (
-    EXPOSURES,
     FLOORS,
     LOOKS,
-    NUM_NOISE,
     PLAIN,
     TEXELS,
     VARIED,
     WALLS,
     Camera,
+    exposures_of,
     flattened,
     patterns,
 )  # fmt: skip
@@ -36,6 +34,7 @@ from mazebench.world.ray_casting import Lidar
 
 from ..common.actor import one_torch_thread
 from ..common.checkpoint import save_checkpoint
+from ..common.descent import Descent, cosine
 from .camera_ranges import MAX_RANGE, NAME, NUM_RAYS, SURE, RangeNetwork, rays_in_view
 
 _BATCH = 64
@@ -72,8 +71,7 @@ class Pictures:
         marker = np.where(rng.random((count, 1)) < _MARKED, marker, -10.0)
         gain, noise_at = np.ones(count, np.float32), np.full(count, -1)
         if look == VARIED:
-            gain = np.exp(rng.uniform(math.log(EXPOSURES[0]), math.log(EXPOSURES[1]), count)).astype(np.float32)
-            noise_at = rng.integers(NUM_NOISE, size=count)
+            gain, noise_at = exposures_of(rng, count)
         marker = np.column_stack([marker, np.zeros(count)])
         pictures = self._cameras[look].take(("egocentric",), maze, pose, marker, gain, noise_at)["egocentric"]
 
@@ -121,19 +119,17 @@ def train(fov: float, updates: int, seed: int) -> Iterator[tuple[int, float, Ran
     task = Task.of("building", split="train", fresh=True, kinds=("dfs", "house", "rooms"))
     pictures, rng = Pictures(task.mazes, fov, seed), np.random.default_rng([seed, 1])
     network = RangeNetwork(len(rays_in_view(fov)))
-    optimizer = torch.optim.Adam(network.parameters(), 2e-3)
-    rate = torch.optim.lr_scheduler.LambdaLR(
-        optimizer, lambda update: max(0.02, 0.5 * (1 + math.cos(math.pi * update / updates)))
+    descent = Descent(
+        network,
+        torch.optim.Adam(network.parameters(), 2e-3),
+        max_gradient_norm=1.0,
+        rate=lambda update: cosine((update - 1) / updates),
     )
     losses = []
     for update in range(1, updates + 1):
         seen, ranges = pictures.draw(VARIED if rng.random() < _VARIED_SHARE else PLAIN)
         loss = network.loss(torch.from_numpy(seen), torch.from_numpy(ranges))
-        optimizer.zero_grad()
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
-        rate.step()
+        descent.step(loss)
         losses.append(loss.item())
         if update % 500 == 0 or update == updates:
             yield update, float(np.mean(losses[-500:])), network

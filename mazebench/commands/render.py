@@ -12,7 +12,6 @@ from mazebench.commands.option_parameters import takes_options, watched_task
 from mazebench.errors import InputError
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.options import options_in
-from mazebench.results.reading import load_result
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
 
@@ -43,6 +42,8 @@ def render(
         raise InputError("expected --results and --episode together, found one of them")
     if results and (chosen := [*values.keys() - {"checkpoint", "overrides"}, *(["agent"] if agent else [])]):
         raise InputError(f"--results has an agent and options of its own; found --{min(chosen).replace('_', '-')}")
+    from mazebench.results.reading import load_result  # imported late: it takes long
+
     result = load_result(results) if results else None
     task = result.summary.task if result else watched_task(values).options
     load_mujoco(renders=view not in (*_DRAWN, *task.sensors))

@@ -39,7 +39,7 @@ _FRAMES_PER_SECOND = 1 / STEP_TIME  # one an agent step: the film runs in real t
 
 
 class Outcome(NamedTuple):
-    """What came of an episode."""
+    """The end of an episode."""
 
     success: bool
     steps: int

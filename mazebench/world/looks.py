@@ -111,6 +111,12 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
     )
 
 
+def exposures_of(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the exposures of `count` pictures in `varied`, `[B]` float32, and where their noise begins, `[B]` int."""
+    darkest, brightest = np.log(EXPOSURES)
+    return np.exp(rng.uniform(darkest, brightest, count)).astype(np.float32), rng.integers(NUM_NOISE, size=count)
+
+
 def rng_of(maze: Maze) -> np.random.Generator:
     """Returns a generator of what is drawn from a hash of the walls."""
     return np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
