@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from acting import inputs_of
 from mazebench_agents.robot import planning
 from mazebench_agents.robot.body import FORWARD, Body
 from mazebench_agents.robot.driving import Drive
+from mazebench_agents.robot.map_matching import MapBelief
+from mazebench_agents.robot.senses import Memory
+from run_folders import records_of
 
+import mazebench
+from mazebench.agent import Interface, Truth
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
@@ -121,3 +127,37 @@ class TestNavigator:
         mazes = load_mazes(13, "train")[:5]
         spec = Task.of(mazes=mazes, distances=(5, 10), sensors=("lidar",), time_limit=100, **perturbation)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= 0.9
+
+
+class TestReferences:
+    def test_the_told_navigator_follows_the_map_until_a_wall_is_seen_on_its_path(self):
+        shown, true = ring(), ring()
+        true[1, 3] = 1.0
+        context = np.stack([shown, shown, goal_at((1, 4)), goal_at((1, 1))])
+        truth = Truth(true[None] > 0.5, np.zeros((1, 3)), np.array([[1, 4]]))
+        inputs = inputs_of({"context": context[None]}, np.array([True]))._replace(truth=truth)
+        memory = Memory(MapBelief(shown, goal_at((1, 4)), 1, None, 7), Body(1.5, 5.5, 0.0, 0.0, 0.0), 0.01, 1.0)
+        agent = load_agent_class("navigator-told").build(Interface("local", 7, 7))
+        for seen, expected in ((None, shown), ((2, 3), shown), ((1, 3), true)):
+            if seen:
+                memory.evidence[seen] = 5.0
+            np.testing.assert_array_equal(agent.estimate(memory, inputs, 0)[0], expected)
+
+    def test_the_told_navigator_is_privileged(self):
+        found = mazebench.evaluate("navigator-told", "rebuilt", level=3, split="dev", distances=(15,))
+        assert (found.privileged, found.overall.success_rate) == (True, 1.0)
+
+    @pytest.mark.parametrize("track", ["adrift", "rough"])
+    def test_the_told_navigator_refuses_a_map_that_may_lie_in_any_way(self, track):
+        expected = "agent 'navigator-told': expected a map that lies as the maze does"
+        with pytest.raises(mazebench.UnplayableError, match=expected):
+            mazebench.evaluate("navigator-told", track, split="dev", distances=(15,))
+
+    def test_without_memory_the_navigator_drives_to_later_goals_longer(self, tmp_path):
+        options = {"task": "rebuilt", "level": 3, "split": "dev", "distances": (15,), "num_goals": 3}
+        agents = "navigator", "navigator-without-memory"
+        for agent in agents:
+            assert mazebench.evaluate(agent, out=tmp_path / agent, **options).overall.success_rate == 1.0
+        steps = [np.array([each["steps"] for each in records_of(tmp_path / agent)]).reshape(-1, 3) for agent in agents]
+        np.testing.assert_array_equal(steps[0][:, 0], steps[1][:, 0])
+        assert steps[0][:, 1:].sum() < steps[1][:, 1:].sum()

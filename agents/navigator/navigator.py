@@ -18,7 +18,7 @@ from ..robot.senses import Memory, Senses, report
 
 
 @dataclasses.dataclass
-class _Robot:
+class Robot:
     """The robot in one environment: what it knows, and the drive that is under way."""
 
     memory: Memory
@@ -51,13 +51,13 @@ class Navigator(Agent):
         """Returns N: the map at full resolution."""
         return size
 
-    def initial_state(self, batch_size: int) -> list[_Robot | None]:
+    def initial_state(self, batch_size: int) -> list[Robot | None]:
         """Returns no robots yet: one is made where an episode begins."""
         return [None] * batch_size
 
     def act(
-        self, inputs: Inputs, state: list[_Robot | None], explore: bool = False
-    ) -> tuple[np.ndarray, list[_Robot | None]]:
+        self, inputs: Inputs, state: list[Robot | None], explore: bool = False
+    ) -> tuple[np.ndarray, list[Robot | None]]:
         """Returns actions `[B]`, for one environment after the other."""
         actions = np.zeros(len(state), dtype=np.int64)
         velocities = np.zeros((len(state), 3))  # of robots that turn as they drive
@@ -66,7 +66,7 @@ class Navigator(Agent):
             if inputs.active is None or inputs.active[slot]:
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
-                    robot = state[slot] = _Robot(memory)
+                    robot = state[slot] = Robot(memory)
 
                 # A path over walls and goal as they are estimated now.
                 walls, goal = self.estimate(memory, inputs, slot)
@@ -83,6 +83,6 @@ class Navigator(Agent):
         """Returns what it plans on, `[L, L]` float twice: the probability of a wall, and weights of the goal."""
         return memory.estimate()
 
-    def report(self, state: list[_Robot | None]) -> Report:
+    def report(self, state: list[Robot | None]) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
         return report(robot.memory if robot else None for robot in state)
