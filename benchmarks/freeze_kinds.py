@@ -21,9 +21,10 @@ from mazebench.maps.benchmark import DEV, FROZEN_SPLITS, KINDS_SIZE, TRACKS_BENC
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
+from mazebench.tasks.arena import arena_of
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.task import Task, resolve_in
+from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
@@ -96,7 +97,8 @@ def contexts_hash(track: str, level: int, mazes: Sequence[Maze], trials: Sequenc
 
 
 def _task(track: str, level: int, mazes: Sequence[Maze]) -> Task:
-    return resolve_in(mazes, TaskOptions(task=track, level=(level,), distances=DISTANCES))
+    asked = TaskOptions(task=track, level=(level,), distances=DISTANCES)
+    return resolve(asked, arena=arena_of(asked, tuple(mazes)))
 
 
 if __name__ == "__main__":

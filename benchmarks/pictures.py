@@ -32,10 +32,11 @@ from mazebench.report.page import lay_on_first_pose
 from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
+from mazebench.tasks.arena import arena_of
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.shown_map import show_map
-from mazebench.tasks.task import resolve, resolve_in
+from mazebench.tasks.task import resolve
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.ray_casting import ray_ends
@@ -212,7 +213,7 @@ def play(maze: Maze | None, agent: str = "oracle", **options: Any) -> Played:
 def draw_planner() -> None:
     """Draws what the neural planner knows, pays and plans in the middle of an episode."""
     asked = TaskOptions(task="rebuilt", level=(2,), distances=(35,))
-    task = resolve_in([load_kind_mazes("train")[HOUSE]], asked)
+    task = resolve(asked, arena=arena_of(asked, (load_kind_mazes("train")[HOUSE],)))
     agent, envs = NeuralPlanner.build(task.interface), MazeVectorEnv(task, 1)
     state, new, steps = agent.initial_state(1), np.ones(1, dtype=bool), []
     observation, info = envs.reset(seed=4)

@@ -10,6 +10,7 @@ The command line, keyword arguments, config files and docs/options.md follow fro
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import math
@@ -137,6 +138,16 @@ class Options:
     def replace(self, **changes: Any) -> Self:
         """Returns the options with other values of some fields."""
         return dataclasses.replace(self, **changes)
+
+    def filled(self, **values: Any) -> Self:
+        """Returns the options with values that follow from them, where they were open.
+
+        Each is checked by itself, but they are not checked beside each other again, as `replace` does.
+        """
+        other = copy.copy(self)
+        for name, value in values.items():
+            object.__setattr__(other, name, fields_of(type(self))[name].checked(name, value))
+        return other
 
     def changed(self) -> dict[str, Any]:
         """Returns the fields that differ from their defaults, by name."""

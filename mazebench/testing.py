@@ -20,7 +20,7 @@ from mazebench.evaluation.plan import task_as_played
 from mazebench.maps.kinds import generate
 from mazebench.rollout import agent_seed, rollout
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.task import Task, as_options, resolve
+from mazebench.tasks.task import Task, as_asked, resolve
 from mazebench.tasks.task_options import TaskOptions
 
 _SIZE = 7
@@ -71,7 +71,7 @@ def check_agent(
         rng = np.random.default_rng(0)
         mazes = tuple(generate("dfs", _SIZE, rng, f"maze-{index}") for index in range(_NUM_MAZES))
         task = TaskOptions(task="hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)
-    asked = as_options(task, options)
+    asked = as_asked(task, options)
     try:
         played = task_as_played(name, checked, asked, resolve)
         _check_acting(name, checked, played, None if checkpoint is None else pathlib.Path(checkpoint))

@@ -179,7 +179,7 @@ def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) ->
         place = np.concatenate([place, place[-1] + rng.normal(0, 0.05, (100, 2))])
     heading = np.arctan2(*np.diff(place, axis=0, prepend=place[:1] - [[1e-3, 0]]).T[::-1])
     observed = None
-    if spec.track is not None and (errors := state_errors(spec, episode)):
+    if spec.options.track is not None and (errors := state_errors(spec, episode)):
         states = np.zeros((len(place), 12))
         states[:, [0, 1, 5]] = np.column_stack([place, heading])
         for error in errors:

@@ -22,7 +22,7 @@ NEAR = Task.of("rebuilt", level=(1, 2), distances=(15, 16), kinds=("dfs", "rooms
 
 
 def collect(folder: pathlib.Path, task: Task = NEAR, agent: str = "oracle", count: int = 3, **how) -> pathlib.Path:
-    collect_demonstrations(EvalOptions(agent=agent, task=task.asked, seed=how.pop("seed", 0)), count, folder, **how)
+    collect_demonstrations(EvalOptions(agent=agent, task=task.options, seed=how.pop("seed", 0)), count, folder, **how)
     return folder
 
 

@@ -80,7 +80,7 @@ class TestRegistration:
         title, size = name.removeprefix("mazebench/").split("-")[:2]
         task = gymnasium.make(name).unwrapped.task
         expected = (title.removesuffix("Goal").lower(), int(size) if size.isdigit() else 31)
-        assert (task.name, task.size) == expected
+        assert (task.options.task, task.size) == expected
 
     def test_an_environment_is_made_with_options(self):
         env = gymnasium.make("mazebench/Local-13-v1", split="eval", distances=[7], context_size=9, seed=3)

@@ -22,6 +22,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import format_maze
 from mazebench.report.episodes import read_results
+from mazebench.results.naming import described
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import sample_episode
@@ -101,7 +102,7 @@ class TestAgents:
     def test_agents_that_plan_drive_at_any_scale(self, name, cell_size):
         agent_class, maze = load_agent_class(name), dfs(9, cell_size)
         spec = Task.of(mazes=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
-        interface = Interface("local", 9, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
+        interface = Interface("local", 9, spec.context_size, sensors=spec.options.sensors, cell_size=cell_size)
         trials = dict(enumerate(draw_trials(spec, 1)))
         agent = agent_class.build(interface)
         played = run_trials(agent, spec, trials, 16, needs_truth=agent_class.needs_truth)
@@ -229,4 +230,4 @@ class TestEvaluation:
 
     def test_a_report_says_the_scale(self, scaled):
         (result,) = read_results([scaled])
-        assert str(result.setting) == "local, 13 × 13, custom mazes, cells of 0.5 m"
+        assert described(result.setting) == "local, 13 × 13, custom mazes, cells of 0.5 m"

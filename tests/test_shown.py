@@ -129,7 +129,7 @@ class TestRosMaps:
             tmp_path, "old", Maze(maze.walls, "old", 0.5), 10, (3.0 + float(right), -2.0 + float(up), yaw), crop=1
         )
         spec = Task.of("building", mazes=new, shown=old, cell_size=0.5)
-        assert (spec.shown[0].walls == spec.mazes[0].walls).all()
+        assert (spec.arena.shown[0].walls == spec.mazes[0].walls).all()
 
     def test_written_mazes_of_a_frame_register(self, tmp_path):
         maze, origin = house(cell_size=0.5), (3.0, -2.0, 0.0)
@@ -138,7 +138,7 @@ class TestRosMaps:
         write_ros_map(older, tmp_path / "new.yaml", origin)
         spec = Task.of("building", mazes=tmp_path / "new.yaml", shown=old)
         assert (spec.mazes[0].walls == older.walls).all()
-        assert (spec.shown[0].walls == maze.walls).all()
+        assert (spec.arena.shown[0].walls == maze.walls).all()
 
     def test_another_yaw_or_place_is_refused_with_the_number(self, tmp_path):
         new = self.write(tmp_path, "new", house(cell_size=0.5), 5, (0.0, 0.0, 0.0))
@@ -211,9 +211,9 @@ class TestChangedBuildings:
         plan = house()
         spec = Task.of("rebuilt", mazes=plan)
         assert [maze.name for maze in spec.mazes] == [f"house-0-changed-{number}" for number in (1, 2, 3, 4)]
-        assert all((older.walls == plan.walls).all() for older in spec.shown)
+        assert all((older.walls == plan.walls).all() for older in spec.arena.shown)
         assert all(maze != plan for maze in spec.mazes)
-        assert not any(spec.joined(index)[maze.walls].any() for index, maze in enumerate(spec.mazes))
+        assert not any(spec.arena.joined(index)[maze.walls].any() for index, maze in enumerate(spec.mazes))
         assert Task.of("adrift", level=2, mazes=plan).mazes == Task.of("rebuilt", level=2, mazes=plan).mazes
         assert spec.replace(level=2).mazes != spec.mazes
         assert Task.of("building", mazes=plan).mazes == (plan,)

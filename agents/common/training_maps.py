@@ -63,14 +63,14 @@ def shows_other_maps(task: Task, agent: str) -> bool:
     name = f"agent {agent!r}"
     if task.options.reward != SPARSE:
         raise InputError(f"{name}: computes the rewards of any goal itself, found reward {task.options.reward!r}")
-    if task.track is None and task.sensors:
-        raise InputError(f"{name}: reads no sensors, found {', '.join(task.sensors)}")
-    if task.track is None and not task.options.active_perturbations:
+    if task.options.track is None and task.options.sensors:
+        raise InputError(f"{name}: reads no sensors, found {', '.join(task.options.sensors)}")
+    if task.options.track is None and not task.options.active_perturbations:
         return False
 
     episode = sample_episode(task, np.random.default_rng(0))
     shown = [show_map(task.replace(level=level), episode) for level in task.levels or (None,)]
     if any(each.drawing is not None or each.hidden for each in shown):
-        found = "map_warp" if task.track is None else f"track {task.track!r}"
+        found = "map_warp" if task.options.track is None else f"track {task.options.track!r}"
         raise InputError(f"{name}: learns only on maps of one pixel a cell with start and goal marked; found {found}")
     return True

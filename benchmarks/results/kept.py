@@ -19,6 +19,7 @@ from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS, scores
+from mazebench.results.naming import order
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_result
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -139,7 +140,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
             lines[WORST_TENTH] = lines[ON_TIME_125].where(lines.maze.isin(rates.nsmallest(-(-len(rates) // 10)).index))
             run = (summary.provenance.checkpoint_sha256 or "")[:8]
             episodes.append(lines.assign(archive=archive, agent=agent, run=run, setting=setting))
-        tables = build_tables(join_episodes(sorted(paper, key=lambda each: each.setting)))
+        tables = build_tables(join_episodes(sorted(paper, key=lambda each: order(each.setting))))
     joined = pd.concat(episodes).astype({"oracle_steps": "Int64"}).set_index(["agent", "setting"])
     return Kept(joined.sort_index(kind="stable"), {table.name: table for table in tables}, training)
 

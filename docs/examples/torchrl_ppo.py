@@ -37,7 +37,7 @@ options = {"distances": [1, 2], "reward": arguments.reward, "autoreset_mode": "D
 envs = gymnasium.make_vec(arguments.id, num_envs=arguments.num_envs, **options)
 # One vector of 12 + 4 M M numbers: the state, which TorchRL calls "observation", then the planes of the context. On a
 # track, the 32 readings of the lidar follow.
-parts = ["observation", "context", *(["lidar"] if envs.task.track else [])]
+parts = ["observation", "context", *(["lidar"] if envs.task.options.track else [])]
 env = TransformedEnv(
     GymWrapper(envs, categorical_action_encoding=True),
     Compose(FlattenObservation(-3, -1, ["context"]), CatTensors(parts, "inputs", sort=False)),

@@ -34,12 +34,13 @@ def collect(
     """Collect demonstrations of an agent on training mazes, as a Minari data set."""
     load_mujoco(renders=False)
     from mazebench.evaluation.collect import collect_demonstrations
+    from mazebench.results.naming import title_of
 
     task, run = TaskOptions(**options_in(values, TaskOptions)), RunOptions(**options_in(values, RunOptions))
     options = EvalOptions(agent=agent, task=task, **options_in(values, EvalOptions))
     with (
         stopping.stoppable(lambda: ("nothing is kept; run it again",)),
-        progress.evaluating(f"{agent}, {task.title}", progress.Kept()) as show,
+        progress.evaluating(f"{agent}, {title_of(task)}", progress.Kept()) as show,
     ):
         collect_demonstrations(
             options, episodes, out, num_envs=run.num_envs, context_per_step=context_per_step, progress=show

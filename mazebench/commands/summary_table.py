@@ -11,6 +11,7 @@ from rich.table import Table
 from mazebench.constants import ON_TIME
 from mazebench.results.comparison import Row
 from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.results.naming import noise_in_words, title_of
 from mazebench.results.paper import printed_mmn
 from mazebench.results.records import Figures, Summary
 
@@ -30,9 +31,9 @@ def print_summary(summary: Summary) -> None:
     """
     task = summary.task
     scale = "" if task.cell_size in (None, 1) else f" cells of {task.cell_size:g} m"
-    title = f"{summary.who}: {task.title}, {task.split_in_results} mazes {task.size} x {task.size}{scale}"
+    title = f"{summary.who}: {title_of(task)}, {task.split_in_results} mazes {task.size} x {task.size}{scale}"
     perturbations = [f"{name} {value}" for name, value in task.perturbations.items() if value]
-    perturbed = ", ".join([*perturbations, *task.noise_in_words])
+    perturbed = ", ".join([*perturbations, *noise_in_words(task)])
     paper = printed_mmn(summary)
     head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
     if summary.overall.recall:

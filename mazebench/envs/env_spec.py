@@ -36,16 +36,16 @@ class JsonSpec:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
             for name in ("mazes", "shown"):
                 if not isinstance(kwargs.get(name), str | None):  # else a path, or none
-                    kwargs[name] = self.task.to_json()[name]
+                    kwargs[name] = self.task.options.to_json()[name]
             spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
 
 
 def env_spec_of(task: Task) -> EnvSpec:
     """Returns Gymnasium's spec of the environment of a task, in plain values."""
-    name = task.name.title() + (f"-{BENCHMARK_SIZES[0]}" if task.track is None else "")
+    name = task.options.task.title() + (f"-{BENCHMARK_SIZES[0]}" if task.options.track is None else "")
     spec = gymnasium.spec(f"mazebench/{name}-v{TASK_VERSION}")
-    return dataclasses.replace(spec, kwargs=task.to_json())
+    return dataclasses.replace(spec, kwargs=task.options.to_json())
 
 
 def _plain(value: Any) -> Any:

@@ -40,7 +40,7 @@ class GoalMazeEnv(MazeEnv):
 
     def __init__(self, task: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         # A track may hide the body's position and has its own time limits, and the goals would tell what is hidden.
-        if task.has_legs or task.track is not None or task.options.hide:
+        if task.has_legs or task.options.track is not None or task.options.hide:
             raise InputError("a goal-conditioned environment: expected the local task, one goal, no track, no hide")
         if task.options.reward != SPARSE:  # another goal's way is not known
             raise InputError(
@@ -48,7 +48,7 @@ class GoalMazeEnv(MazeEnv):
             )
         super().__init__(task, seed, render_mode, camera)
         side, num_values = task.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task.context_size**2
-        sensed = {name: spaces.observation_space(task)[name] for name in task.sensors}
+        sensed = {name: spaces.observation_space(task)[name] for name in task.options.sensors}
         self.observation_space = gymnasium.spaces.Dict(
             {
                 "observation": gymnasium.spaces.Box(-np.inf, np.inf, (num_values,), np.float32),

@@ -162,10 +162,10 @@ for _entry_point in (make, make_goal, make_vec):
 
 def _task(task: str | Task | TaskOptions, options: dict[str, Any], arguments: Sequence[str], id_size: int = 0) -> Task:
     """Returns the task of an environment that takes `arguments` besides `options`."""
-    from mazebench.tasks.task import Task, as_options, resolve
+    from mazebench.tasks.task import Task, as_asked, resolve
 
     if isinstance(task, Task) and not options:
         return task
     if options.get("mazes") is None and options.get("size") is None and id_size:
         options["size"] = id_size
-    return resolve(as_options(task, options, arguments))
+    return resolve(as_asked(task, options, arguments))

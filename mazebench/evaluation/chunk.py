@@ -199,7 +199,7 @@ def to_trajectory(plan: Plan, result: Result) -> Trajectory | None:
     if not len(result.kept):
         return None
     task, poses = plan.task, np.asarray(result.kept)
-    is_wrong = task.track is not None and state_errors(task, plan.trials[result.number].episode)
+    is_wrong = task.options.track is not None and state_errors(task, plan.trials[result.number].episode)
     return Trajectory(poses[:, :3], poses[:, 3:] if is_wrong else None)
 
 
@@ -215,7 +215,7 @@ def to_record(plan: Plan, result: Result) -> Record:
     spl_of_disc, spl_grid = spl(np.array([result.success]), shortest, np.array([result.path_length])).tolist()
     values = {
         "agent": plan.options.agent,
-        "task": task.name,
+        "task": task.options.task,
         "size": task.size,
         "split": task.options.split_in_results,
         "episode": result.number,
@@ -233,7 +233,7 @@ def to_record(plan: Plan, result: Result) -> Record:
         "leg": result.leg,
         "oracle_steps": leg.oracle_steps,
     }
-    is_track = task.track is not None
+    is_track = task.options.track is not None
     optional = {
         "cell_size": None if task.cell_size == 1 else task.cell_size,
         "level": task.options.track_level if is_track else None,

@@ -25,6 +25,7 @@ from mazebench.errors import InputError, RunError, remark
 from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
+from mazebench.results.naming import described, title_of
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.rules import reward
@@ -93,11 +94,14 @@ def collect_demonstrations(
             trials = _trials_of(plan, num_episodes)
             episodes = _play(plan, trials, num_envs, progress)
             metadata = _reference_scores(task, dict(list(trials.items())[:_NUM_REFERENCE]), options.seed)
+            strengths = task.options.active_perturbations
+            name = title_of(task.options) if task.options.track else f"{task.options.task}-{task.size}"
+            name += "".join(f"-{each.rpartition('_')[2]}-{value:g}" for each, value in strengths)
             metadata |= {
-                "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{task.options.slug}-{options.agent}")),
+                "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{name}-{options.agent}")),
                 "minari_version": minari.__version__,
                 "algorithm_name": options.agent,
-                "description": f"{task.options}, driven by {options.agent}",
+                "description": f"{described(task.options)}, driven by {options.agent}",
                 "requirements": [f"mazebench-mujoco=={__version__}"],
             }
 

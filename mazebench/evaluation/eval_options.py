@@ -9,7 +9,7 @@ from annotated_types import Ge, Interval
 
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.options import Doc, Options, Overrides, options_in
-from mazebench.tasks.task import Task, as_options
+from mazebench.tasks.task import Task, as_asked, options_of
 from mazebench.tasks.task_options import TaskOptions
 
 EPISODES = ("episodes_per_distance", "episodes_per_maze")  # fields that say how many episodes there are
@@ -54,7 +54,7 @@ def eval_options(agent: str, task: str | Task | TaskOptions = "local", **options
     """
     of_evaluation = options_in(options, EvalOptions)
     of_task = {name: value for name, value in options.items() if name not in of_evaluation}
-    return EvalOptions.of(of_evaluation, agent=agent, task=as_options(task, of_task))
+    return EvalOptions.of(of_evaluation, agent=agent, task=options_of(as_asked(task, of_task)))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

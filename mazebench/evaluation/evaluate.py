@@ -50,8 +50,8 @@ def evaluate(
 
     Args:
       agent: the name of an installed agent, "module:Class", or a class.
-      task: "local", "hierarchical" or the name of a track; or a `Task`, of which counts what was asked. What is open is
-        filled as in evaluations: eval mazes, distances of 1 to 15.
+      task: "local", "hierarchical" or the name of a track, by default in eval mazes and at distances of 1 to 15; or a
+        `Task`, which is played as it is.
       out: the folder for records, summary and options; None keeps the summary alone.
       progress: called as episodes end, with their number and that of all.
       **options: by name, as docs/options.md and docs/evaluate.md list them: those of the evaluation (`EvalOptions`:
@@ -76,7 +76,7 @@ def evaluate(
     chosen = eval_options(name, task, **{key: value for key, value in options.items() if key not in of_run})
     if run.workers and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
-    return run_evaluation(chosen, out, run, progress, agent_class)
+    return run_evaluation(chosen, out, run, progress, agent_class, task if isinstance(task, Task) else None)
 
 
 def run_evaluation(
@@ -85,13 +85,15 @@ def run_evaluation(
     run: RunOptions,
     progress: Progress = lambda ended, of: None,
     agent_class: type[Agent] | None = None,
+    task: Task | None = None,
 ) -> Summary:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
-    `agent_class` is the class that `options.agent` names, if it is loaded already.
+    `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
+    already.
     """
     out = None if out is None else pathlib.Path(out).absolute()
-    plan = make_plan(options, agent_class)
+    plan = make_plan(options, agent_class, task=task)
     if plan.remark:
         remark(plan.remark)
     if plan.provenance.agent_code_sha256 is None:

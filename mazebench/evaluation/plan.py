@@ -22,7 +22,7 @@ from mazebench.options import override
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.sensors import LIDAR
-from mazebench.tasks.task import Task, resolve_for_evaluation
+from mazebench.tasks.task import Task, options_of, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.trials import Trial, select_trials
 from mazebench.world.mjcf import largest_spec
@@ -65,7 +65,7 @@ class Plan:
     def remark(self) -> str | None:
         """A line of what a user should know before the evaluation; None if there is nothing."""
         task, agent, size = self.task, self.options.agent, _square(self.task.context_size)
-        is_coarse = task.track is None and task.context_size < task.size
+        is_coarse = task.options.track is None and task.context_size < task.size
         way_out = "; context_size() of its class chooses another one (docs/custom_agents.md)" if is_coarse else ""
         if self.untrained_scale:
             return (
@@ -74,15 +74,14 @@ class Plan:
             )
         if task.options.mazes is not None and is_coarse:
             return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
-        if task.track is not None:
+        if task.options.track is not None:
             try:
                 wanted = context_size_of(agent, self.agent_class, task.size)
             except (InputError, RunError):  # not meant for mazes of this size
                 return None
             if wanted not in (task.context_size, default_context_size(task.size)):
-                return (
-                    f"{agent} asks for a map of {_square(wanted)}; the track {task.track!r} shows {size} to all agents"
-                )
+                track = task.options.track
+                return f"{agent} asks for a map of {_square(wanted)}; the track {track!r} shows {size} to all agents"
         return None
 
     @property
@@ -131,7 +130,7 @@ def build_agent(
     if len(wanted) == 1 and interface.context_size not in wanted:
         raise UnplayableError(
             f"agent {options.agent!r}: its context_size() asks for maps of {_square(wanted.pop())} only; the track "
-            f"{task.track!r} shows {_square(interface.context_size)}"
+            f"{task.options.track!r} shows {_square(interface.context_size)}"
         )
     if needed := [name for name in agent_class.needs_shown if name in interface.hidden]:
         raise UnplayableError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
@@ -153,6 +152,7 @@ def make_plan(
     agent_class: type[Agent] | None = None,
     trials: Sequence[Trial] | None = None,
     resolver: Callable[..., Task] = resolve_for_evaluation,
+    task: Task | None = None,
 ) -> Plan:
     """Returns the plan of an evaluation; reads what is needed and writes nothing.
 
@@ -161,14 +161,15 @@ def make_plan(
       agent_class: the class that `options.agent` names, if it is loaded already.
       trials: other episodes than those of the evaluation.
       resolver: makes the task of the options, as `mazebench.tasks.task.resolve` does.
+      task: the task whose options are `options.task`, if it is there already.
 
     Raises:
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    task = task_as_played(options.agent, agent_class, options.task, resolver)
+    task = task_as_played(options.agent, agent_class, task or options.task, resolver)
     options, config = _with_checkpoint(options, agent_class), config_of(options, agent_class)
-    if task.track is None or task.options.mazes is None:
+    if task.options.track is None or task.options.mazes is None:
         options = options.replace(episodes_per_distance=options.episodes_per_distance or EPISODES_PER_DISTANCE)
     if ":" in options.agent:  # modules that it imports when it is built are part of its code
         with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
@@ -179,7 +180,7 @@ def make_plan(
     world = largest_spec(task.mazes[0])  # the hash of the mazes tells the walls, too
     identity = {
         "agent": options.agent,
-        **task.to_json(),
+        **task.options.to_json(),
         "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart, as it does older maps
         **({} if task.options.shown is None else {"shown": "own"}),
         "episodes_per_distance": options.episodes_per_distance,
@@ -199,19 +200,27 @@ def _square(side: int) -> str:
     return f"{side} x {side}"
 
 
-def task_as_played(agent: str, agent_class: type[Agent], asked: TaskOptions, resolver: Callable[..., Task]) -> Task:
+def task_as_played(
+    agent: str, agent_class: type[Agent], asked: TaskOptions | Task, resolver: Callable[..., Task]
+) -> Task:
     """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps.
 
     Raises:
       UnplayableError: if sensors other than the lidar are named, and the agent needs more.
     """
-    plays = agent_class.plays_actions
-    if asked.actions is None and "six" not in plays:
-        asked = asked.replace(actions=plays[0])
-    if asked.sensors in ((), (LIDAR,)):
-        asked = asked.replace(sensors=tuple(dict.fromkeys((*asked.sensors, *agent_class.needs_sensors))))
-    asked = asked.replace(context_size=None)
-    task = resolver(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
+    options, plays = options_of(asked), agent_class.plays_actions
+    chosen: dict[str, Any] = {}
+    if options.actions is None and "six" not in plays:
+        chosen["actions"] = plays[0]
+    if options.sensors in ((), (LIDAR,)):
+        chosen["sensors"] = tuple(dict.fromkeys((*options.sensors, *agent_class.needs_sensors)))
+    if isinstance(asked, TaskOptions):
+        chosen["context_size"] = None
+    chosen = {name: value for name, value in chosen.items() if value != getattr(options, name)}
+    task = resolver(
+        asked.replace(**chosen) if chosen else asked,
+        context_size_of=functools.partial(context_size_of, agent, agent_class),
+    )
     for name in agent_class.needs_sensors:
         task.interface.require_sensor(name, agent)
     return task

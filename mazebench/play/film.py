@@ -123,9 +123,9 @@ def _film(plan: Plan, number: int, out: pathlib.Path, view: str, pixels: int) ->
 
 def run_episode(plan: Plan, number: int, view: str, pixels: int, is_film: bool) -> tuple[list[np.ndarray], Outcome]:
     """Runs an episode of a plan; returns a picture of each of its moments, or of the last one, and its outcome."""
-    if view in SENSORS and view not in (*CAMERAS, *plan.task.sensors):
+    if view in SENSORS and view not in (*CAMERAS, *plan.task.options.sensors):
         raise InputError(f"view {view!r}: expected a task with this sensor; add --sensors {view}")
-    views = (MAP, *dict.fromkeys((*CAMERAS, *plan.task.sensors))) if view == "all" else (view,)
+    views = (MAP, *dict.fromkeys((*CAMERAS, *plan.task.options.sensors))) if view == "all" else (view,)
     trial = plan.trials[number]
     episode = trial.episode
     maze = plan.task.mazes[episode.maze]
@@ -175,7 +175,7 @@ class _Scene:
         self._task = self.envs.task
         self._path: list[np.ndarray] = []  # [2] m each
         self.record_position()
-        names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.sensors)
+        names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.options.sensors)
         self._cameras = Cameras(self._task.mazes, names, self.pixels) if names else None
 
     def record_position(self) -> None:

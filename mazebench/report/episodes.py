@@ -13,6 +13,7 @@ import pandas as pd
 
 from mazebench.errors import InputError, remark
 from mazebench.results.metrics import by_fact, scores
+from mazebench.results.naming import described, order, own_in_words, setting_of
 from mazebench.results.played import Shown, played_task, shown_of
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
@@ -29,7 +30,7 @@ class ReportedResult:
     folder: pathlib.Path
     summary: Summary
     label: str  # the agent's name, with the training run if results are of several
-    setting: TaskOptions  # of which results are compared, see `TaskOptions.setting`
+    setting: TaskOptions  # of which results are compared, see `setting_of`
     episodes: pd.DataFrame  # a row for each record in protocol order; the metrics are columns
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
     task: Task | None  # None if its mazes are gone
@@ -46,7 +47,7 @@ class ReportedResult:
         """The map shown to the agent in each episode of a result with paths or perturbations; empty for others."""
         if self.task is None or not (self.trajectories or self.setting.active_perturbations):
             return []
-        indices = {maze.name: index for index, maze in enumerate(self.task.fixed_mazes)}
+        indices = {maze.name: index for index, maze in enumerate(self.task.arena.fixed_mazes)}
         legs = list(zip(*(self.episodes[name] for name in ("maze", "start", "goal", "seed")), strict=True))
         shown = []
         for number, (maze, *ends, seed) in enumerate(legs):
@@ -57,7 +58,7 @@ class ReportedResult:
     @functools.cached_property
     def walls(self) -> dict[str, np.ndarray]:
         """The walls `[N, N]` bool of the mazes by their names; none if the task is not known."""
-        return {maze.name: maze.walls for maze in self.task.fixed_mazes} if self.task else {}
+        return {maze.name: maze.walls for maze in self.task.arena.fixed_mazes} if self.task else {}
 
 
 def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
@@ -96,8 +97,8 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     for result in sorted(results, key=lambda each: -len(each.episodes)):
         other = kept.setdefault((result.label, result.setting), result)
         if other is not result:
-            remark(f"{result.folder}: {result.label}, {result.setting} again, as in {other.folder}; skipped")
-    return sorted((result for result in results if result in kept.values()), key=lambda result: result.setting)
+            remark(f"{result.folder}: {result.label}, {described(result.setting)} again, as in {other.folder}; skipped")
+    return sorted((result for result in results if result in kept.values()), key=lambda result: order(result.setting))
 
 
 def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
@@ -108,7 +109,7 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
     numbers of the maze and of the `trial`: episodes with one maze, start, goal and seed are one trial.
     """
     labels = list(dict.fromkeys(result.label for result in results))
-    settings = sorted({result.setting for result in results})
+    settings = sorted({result.setting for result in results}, key=order)
     episodes = pd.concat(
         [
             result.episodes.assign(
@@ -188,7 +189,7 @@ def reported(result: Result) -> ReportedResult:
     episodes["distance"] = [record.asked_distance for record in records]
     facts = by_fact(records)
     episodes = episodes.assign(**scores(records), **facts)
-    setting = summary.task.setting
+    setting = setting_of(summary.task)
     if setting.mazes is not None:  # by their names, wherever the files were
         shown = None if setting.shown is None else "an older map"
         setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())), shown=shown)
@@ -208,7 +209,7 @@ def reported(result: Result) -> ReportedResult:
 
 def _mazes_in_words(result: ReportedResult) -> str:
     """Returns the set of mazes, and what else a user chose; an empty text for the benchmark's eval mazes."""
-    split, words = result.setting.split_in_results, result.setting.own_in_words
+    split, words = result.setting.split_in_results, own_in_words(result.setting)
     if split == CUSTOM:
         names = sorted(result.episodes.maze.unique())
         words = (f"mazes {', '.join(names[:3])}" + (f" and {len(names) - 3} more" if len(names) > 3 else ""), *words)

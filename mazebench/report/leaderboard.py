@@ -25,6 +25,7 @@ from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import is_on_time
+from mazebench.results.naming import noise_in_words, sensors_in_words, title_of
 from mazebench.results.reading import SUITE, SUMMARY, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_file
@@ -37,7 +38,7 @@ BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
 PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
 LIDAR, CAMERA = "lidar", "camera"
 SUITE_OF = {LIDAR: "tracks", CAMERA: "tracks-camera"}  # by division
-DIVISIONS = {SUITES[suite][0].task.sensors_in_words: division for division, suite in SUITE_OF.items()}  # by sensors
+DIVISIONS = {sensors_in_words(SUITES[suite][0].task): division for division, suite in SUITE_OF.items()}  # by sensors
 
 
 class Entry(pydantic.BaseModel):
@@ -134,11 +135,11 @@ def _make_entry(folder: pathlib.Path) -> Entry:
     if len(agents := sorted({summary.row for summary in summaries})) > 1:
         raise InputError(f"{folder}: expected results of one agent, found those of {', '.join(agents)}")
     episodes = pd.concat(map(_read_episodes, results))
-    if sorted(summary.task.title for summary in summaries) != sorted(PARTS):
-        found = ", ".join(summary.task.title for summary in summaries)
+    if sorted(title_of(summary.task) for summary in summaries) != sorted(PARTS):
+        found = ", ".join(title_of(summary.task) for summary in summaries)
         raise InputError(f"{folder}: expected one result of each of {', '.join(PARTS)}, found {found}")
 
-    sensors = summaries[0].task.sensors_in_words
+    sensors = sensors_in_words(summaries[0].task)
     if sensors not in DIVISIONS:
         divisions = " or ".join(f"{each} (division {name})" for each, name in DIVISIONS.items())
         raise InputError(f"{folder}: expected the sensors {divisions}, found {sensors}")
@@ -167,8 +168,8 @@ def _read_episodes(result: Result) -> pd.DataFrame:
     """Returns the `part`, `maze`, `success` and `on_time` of all frozen episodes of a part; refuses other episodes."""
     summary, records = result.summary, result.records
     task, provenance = summary.task, summary.provenance
-    if task.title not in PARTS or task.split_in_results != "eval" or task.noise_in_words:
-        found = " ".join([task.split_in_results, task.title, *task.noise_in_words])
+    if title_of(task) not in PARTS or task.split_in_results != "eval" or noise_in_words(task):
+        found = " ".join([task.split_in_results, title_of(task), *noise_in_words(task)])
         raise InputError(f"{result.folder}: expected eval episodes of a track, with its senses, found {found}")
     if provenance.benchmark_manifest_sha256 != manifest_hash(summary.benchmark):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
@@ -187,7 +188,9 @@ def _read_episodes(result: Result) -> pd.DataFrame:
         raise InputError(f"{result.folder}: expected bodies of at most {FASTEST:.1f} m/s, found {found}")
 
     on_time = is_on_time(records, ON_TIME[0])
-    return pd.DataFrame({"part": task.title, "maze": column(records, "maze"), "success": success, "on_time": on_time})
+    return pd.DataFrame(
+        {"part": title_of(task), "maze": column(records, "maze"), "success": success, "on_time": on_time}
+    )
 
 
 def main(*arguments: str) -> None:

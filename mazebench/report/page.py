@@ -25,6 +25,7 @@ from mazebench.maps import colors
 from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import to_svg
 from mazebench.report.table import Table
+from mazebench.results import naming
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
 from mazebench.world.mjcf import BODY_RADIUS
@@ -88,7 +89,7 @@ def _base64(content: bytes) -> str:
 
 def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int]]) -> dict[str, Any]:
     """Returns what explorer.js knows of all results before it unpacks the episodes of one, `columns` of each."""
-    settings = sorted({result.setting for result in results})
+    settings = sorted({result.setting for result in results}, key=naming.order)
     mazes: dict[tuple[str, str | None], int] = {}  # names and walls, with their numbers
     described = []
     for result, used in zip(results, columns, strict=True):
@@ -107,7 +108,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
                 "episodes": len(result.episodes),
                 "exact": setting.is_exact,
                 "picture": 0 if not maps or maps[0].are_cells else len(maps[0].walls),  # pixels a side, if no cells
-                "lidar": task.options.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
+                "lidar": task.options.lidar.max_range if task and "lidar" in task.options.sensors else 0,  # m
                 "groups": result.facts,
             }
         )
@@ -116,7 +117,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
         results, key=lambda each: (not each.trajectories, not each.setting.is_exact, not each.setting.is_hierarchical)
     )
     return {
-        "settings": list(map(str, settings)),
+        "settings": list(map(naming.described, settings)),
         "rays": NUM_RAYS,
         "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
         "timeColors": [mpl.colors.to_hex(color) for color in _TIME_COLORS],

@@ -13,6 +13,7 @@ from mazebench.options import fields_of
 from mazebench.report.episodes import at_common_distances, common_distances, facts_of
 from mazebench.report.table import ALL_METRICS, Table, make_values
 from mazebench.results.intervals import Estimate, mean_interval, runs_interval
+from mazebench.results.naming import described
 from mazebench.results.paper import printed
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
 from mazebench.tasks.task_options import TaskOptions
@@ -37,9 +38,9 @@ def build_tables(episodes: pd.DataFrame) -> list[Table]:
             for table in _tables_of(episodes[episodes.mazes == mazes])
         ]
     settings = list(episodes.groupby("setting", observed=True))
-    names = Counter(str(setting) for setting, _ in settings)
+    names = Counter(described(setting) for setting, _ in settings)
     rows = {
-        str(setting) + f", {group.mazes.iloc[0]}" * (names[str(setting)] > 1): at_common_distances(group)
+        described(setting) + f", {group.mazes.iloc[0]}" * (names[described(setting)] > 1): at_common_distances(group)
         for setting, group in settings
     }
     return [*tables, make_table("all", "All results", _DISTANCES_NOTE, "setting", rows)]

@@ -17,6 +17,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.results.intervals import Estimate, difference_interval
 from mazebench.results.metrics import by_distance, scores
+from mazebench.results.naming import noise_in_words, title_of
 from mazebench.results.reading import Result, find_parts, load_result
 from mazebench.results.records import Record, Summary, column
 
@@ -82,7 +83,7 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
     first, second = (result.summary for result in pairs[common[0]])
     task = first.task
     title = f"A is {_who(first, common)} in {a}, B is {_who(second, common)} in {b}"
-    title += f"; {task.title}, {task.split_in_results} mazes {task.size} x {task.size}" if common == [""] else ""
+    title += f"; {title_of(task)}, {task.split_in_results} mazes {task.size} x {task.size}" if common == [""] else ""
     return Comparison(
         title=title,
         parts={name: compare_results(*pair) for name, pair in pairs.items()},
@@ -180,7 +181,7 @@ def _row_to_json(row: Row) -> dict[str, Any]:
 def _who(summary: Summary, parts: list[str]) -> str:
     """Returns the agent's row and, for a single evaluation, its track and level or its perturbations."""
     task = summary.task
-    wrong = [*(f"{key} {value}" for key, value in task.perturbations.items() if value), *task.noise_in_words]
+    wrong = [*(f"{key} {value}" for key, value in task.perturbations.items() if value), *noise_in_words(task)]
     if task.track is not None:
-        wrong.insert(0, f"track {task.title.replace(' ', ', level ', 1)}")
+        wrong.insert(0, f"track {title_of(task).replace(' ', ', level ', 1)}")
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")

@@ -7,6 +7,7 @@ import json
 from importlib import resources
 from typing import Any
 
+from mazebench.results.naming import noise_in_words
 from mazebench.results.records import Summary
 
 
@@ -32,6 +33,6 @@ def printed_mmn(summary: Summary) -> dict[int, float]:
     That is where it is of unseen mazes, of no track, nothing was perturbed and the senses were not noisy.
     """
     task = summary.task
-    if task.split_in_results != "eval" or not task.is_exact or task.noise_in_words:
+    if task.split_in_results != "eval" or not task.is_exact or noise_in_words(task):
         return {}
     return printed(task.task, task.size or 0).get("MMN", {}).get("success_rate", {})

@@ -60,9 +60,9 @@ def mazes_hash(task: Task) -> str:
     1 m, the width of the benchmark's cells, is left out.
     """
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
-    mazes = (task.mazes[0],) if task.options.fresh else task.fixed_mazes
+    mazes = (task.mazes[0],) if task.options.fresh else task.arena.fixed_mazes
     walls = b"".join(maze.walls.tobytes() for maze in mazes)
-    older = b"".join(each.walls.tobytes() for each in task.shown or ())
+    older = b"".join(each.walls.tobytes() for each in task.arena.shown or ())
     return hashlib.sha256(walls + scale.encode("ascii") + older).hexdigest()
 
 

@@ -10,6 +10,7 @@ import pydantic
 
 from mazebench.errors import one_line
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
+from mazebench.results.naming import sensors_in_words
 from mazebench.storage.json_files import to_line
 from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task_options import TaskOptions
@@ -155,7 +156,7 @@ class Summary(_Stored):
         """
         config = "".join(f" {name}={value}" for name, value in self.config.items())
         acting = "" if self.task.actions in (None, "six") else f" with {self.task.actions} actions"
-        sensors = self.task.sensors_in_words
+        sensors = sensors_in_words(self.task)
         acting += "" if sensors == (LIDAR if self.task.track else "") else f" with {sensors}"
         without = f" without {' and '.join(self.task.hide)}" if self.task.hide else ""
         return self.agent + config + acting + without + (" with the true pose" if self.task.exact_pose else "")

@@ -56,10 +56,10 @@ def episode_level(task: Task, episode: Episode) -> int:
 def perturbations_of(task: Task, episode: Episode) -> list[tuple[Perturbation, np.random.Generator]]:
     """Returns the perturbations of `episode`, in the order in which they apply, each with a generator of its stream."""
     perturbations = [PERTURBATIONS[name](strength) for name, strength in task.options.active_perturbations]
-    if task.track is not None:
-        of_level = TRACKS[task.track].levels[episode_level(task, episode) - 1].perturbations
+    if task.options.track is not None:
+        of_level = TRACKS[task.options.track].levels[episode_level(task, episode) - 1].perturbations
         # An older map of the building tells what has changed instead of doors that are drawn.
-        perturbations += [each for each in of_level if task.shown is None or not isinstance(each, MovedDoors)]
+        perturbations += [each for each in of_level if task.arena.shown is None or not isinstance(each, MovedDoors)]
     return [(perturbation, episode.stream(perturbation.stream)) for perturbation in perturbations]
 
 
@@ -68,11 +68,11 @@ def goals_of(task: Task, episode: Episode) -> tuple[Cell, ...]:
 
     On a track, each goal after the first one is drawn from the goal before it, so that the shown map can keep all free.
     """
-    if task.track is None or task.options.num_goals == 1:
+    if task.options.track is None or task.options.num_goals == 1:
         return (episode.goal,)
     goals, rng = [episode.goal], episode.stream(Stream.LATER_GOALS)
     while len(goals) < task.options.num_goals:
-        maze, joined = task.mazes[episode.maze], task.joined(episode.maze)
+        maze, joined = task.mazes[episode.maze], task.arena.joined(episode.maze)
         goals.append(draw_goal(maze, task.distances, goals[-1], rng, joined))
     return tuple(goals)
 
@@ -108,13 +108,13 @@ def sample_episode(task: Task, rng: np.random.Generator) -> Episode:
 def _sample_episode(task: Task, rng: np.random.Generator) -> Episode:
     index = int(rng.integers(len(task.mazes)))
     maze = task.mazes[index]
-    if task.track is not None and isinstance(task.mazes, FreshMazes):
-        TRACKS[task.track].require(maze, task.levels)
-    start, goal = task.ends(index)
+    if task.options.track is not None and isinstance(task.mazes, FreshMazes):
+        TRACKS[task.options.track].require(maze, task.levels)
+    start, goal = task.arena.ends(index)
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if task.options.pairs == "fixed" else rng
         distance = task.distances[pair_rng.integers(len(task.distances))]
-        start, goal = sample_pair(maze, distance, pair_rng, start, goal, task.joined(index))
+        start, goal = sample_pair(maze, distance, pair_rng, start, goal, task.arena.joined(index))
     return make_episode(index, start, goal, rng)
 
 
@@ -178,7 +178,7 @@ def check_episode(task: Task, episode: Episode) -> Episode:
         raise InputError(f"expected a maze from 0 to {len(task.mazes) - 1}, found {episode.maze}")
     for cell in (episode.start, episode.goal):
         task.mazes[episode.maze].require_free(cell)
-        if (joined := task.joined(episode.maze)) is not None and not joined[cell]:
+        if (joined := task.arena.joined(episode.maze)) is not None and not joined[cell]:
             raise InputError(f"expected start and goal that are free and joined on the older map, found {cell}")
     if episode.start == episode.goal:
         raise InputError(f"expected a goal in another cell than the start, found both in {episode.goal}")

@@ -24,7 +24,7 @@ def observation_specs(task: Task) -> dict[str, specs.Array]:
     return {
         "state": specs.Array((STATE_SIZE,), np.float32, name="state"),
         "context": specs.BoundedArray((NUM_PLANES, size, size), np.float32, 0.0, 1.0, name="context"),
-        **{name: SENSORS[name].observation_spec(name, task.options) for name in task.sensors},
+        **{name: SENSORS[name].observation_spec(name, task.options) for name in task.options.sensors},
     }
 
 
@@ -44,7 +44,7 @@ class OpenSensors:
     def __init__(self, task: Task):
         self._task = task
         names: dict[type[Sensor], list[str]] = {}
-        for name in task.sensors:
+        for name in task.options.sensors:
             names.setdefault(SENSORS[name], []).append(name)
         self._sensors = [kind(tuple(of_kind), task.options, task.mazes) for kind, of_kind in names.items()]
 

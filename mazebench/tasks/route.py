@@ -78,8 +78,8 @@ def plan_route(task: Task, episode: Episode, shown: ShownMap) -> Route:
     maze, options = task.mazes[episode.maze], task.options
     if not options.is_hierarchical:
         _, *later = goals_of(task, episode)
-        num_left, joined = options.num_goals - 1, task.joined(episode.maze)
-        legs = _LaterLegs(num_left, maze, task.track, options.time_limit, later, task.distances, joined, episode)
+        num_left, joined = options.num_goals - 1, task.arena.joined(episode.maze)
+        legs = _LaterLegs(num_left, maze, options.track, options.time_limit, later, task.distances, joined, episode)
         return Route([episode.start, episode.goal], legs.limit(episode.start, episode.goal), legs)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     assert options.time_limit is not None  # a task that is no track has one

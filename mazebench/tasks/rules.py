@@ -83,7 +83,7 @@ class Rules:
         self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
         self._picture_noise: list[np.random.Generator | None] = [None] * num_envs
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
-        self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", task.track or ""))
+        self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", task.options.track or ""))
         self.blocked = np.zeros(num_envs, dtype=bool)
         self._ways: list[np.ndarray | None] = [None] * num_envs  # [N * N] int, in cells from each cell to the goal
         self.active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
@@ -122,15 +122,15 @@ class Rules:
         self.shown[i] = shown = show_map(task, episode)
         self.routes[i] = route = plan_route(task, episode, shown)
         self._state_errors[i] = state_errors(task, episode)
-        if "lidar" in task.sensors and task.options.lidar.is_random:
+        if "lidar" in task.options.sensors and task.options.lidar.is_random:
             self._lidar_noise[i] = episode.stream(Stream.LIDAR_NOISE)
         if task.options.look == VARIED:
             self._picture_noise[i] = episode.stream(Stream.PICTURE_NOISE)
 
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
-        self.level[i] = 0 if task.track is None else episode_level(task, episode)
-        self.track[i] = task.track or ""
+        self.level[i] = 0 if task.options.track is None else episode_level(task, episode)
+        self.track[i] = task.options.track or ""
         self.pose[i] = (*maze.point(episode.start), episode.yaw)
         self.path_length[i] = self.steps[i] = self.progress[i] = 0
         self.cell[i] = episode.start[0] * task.size + episode.start[1]
@@ -246,7 +246,7 @@ class Rules:
                 for add_error in self._state_errors[i]:
                     add_error(state)
         observed = {"state": states.astype(np.float32)}
-        if self.task.sensors:
+        if self.task.options.sensors:
             worlds = Worlds(
                 self.maze[indices],
                 self.pose[indices],

@@ -17,7 +17,7 @@ _PLANES = {"map": (GLOBAL_MAP, LOCAL_MAP), "goal": (GOAL,)}  # of the context, b
 def show_map(task: Task, episode: Episode) -> ShownMap:
     """Returns the map that the agent is shown in `episode`."""
     maze = task.mazes[episode.maze]
-    walls = maze.walls if task.shown is None else task.shown[episode.maze].walls
+    walls = maze.walls if task.arena.shown is None else task.arena.shown[episode.maze].walls
     shown = ShownMap(walls, kind=maze.kind, cell_size=maze.cell_size)
     ends = (episode.start, *goals_of(task, episode))
     for perturbation, rng in perturbations_of(task, episode):
@@ -36,7 +36,7 @@ def leg_context(task: Task, shown: ShownMap, start: Cell, goal: Cell) -> np.ndar
     On a track, the values of the maps have 8 bits.
     """
     context = build_context(shown.seen_walls, shown.seen_cell(start), shown.seen_cell(goal), task.context_size)
-    if task.track is not None:
+    if task.options.track is not None:
         maps = context[[GLOBAL_MAP, LOCAL_MAP]]
         context[[GLOBAL_MAP, LOCAL_MAP]] = np.rint(maps * _GREY_LEVELS) / _GREY_LEVELS
     for plane in (*shown.hidden, *(plane for name in task.options.hide for plane in _PLANES[name])):

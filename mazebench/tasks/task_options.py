@@ -8,7 +8,6 @@ import pathlib
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-import numpy as np
 from annotated_types import Ge, Interval
 
 from mazebench.constants import DISCRETE, VELOCITIES
@@ -22,10 +21,8 @@ from mazebench.maps.benchmark import (
     TRACKS_BENCHMARK,
 )
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
-from mazebench.maps.maze import Cell, Maze, corner_cells
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.older_map import OlderMap
-from mazebench.maps.places import free_cell_of_place, place_text
+from mazebench.maps.places import place_text
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes, texts_of
 from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
@@ -48,8 +45,6 @@ NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
 _RETIRED = (("textures", False), ("walls", "filled"))  # options of earlier versions, and the values that said nothing
-# Fields that an agent may choose, or is not told, while the same is played.
-_OF_AGENTS = ("actions", "sensors", *CAMERA_OPTIONS, "hide", "exact_pose", "context_size")
 
 
 def _as_mazes(mazes: Any) -> Any:
@@ -66,8 +61,8 @@ class TaskOptions(SensorOptions, ReadOptions):
     """The options of a task: what was asked. None is open; `Task` fills it.
 
         >>> options = mazebench.Task.of("rebuilt", level=2).options
-        >>> options.title, options.size
-        ('rebuilt 2', 31)
+        >>> options.task, options.level, options.size
+        ('rebuilt', (2,), 31)
 
     Raises:
       InputError: if an option is not allowed, or options contradict each other.
@@ -342,118 +337,6 @@ class TaskOptions(SensorOptions, ReadOptions):
         """True if mazes have patterns that training mazes don't have: those of other splits than train."""
         return self.split not in (None, "train")
 
-    def ends(self, maze: Maze, older: OlderMap | None = None) -> tuple[Cell | None, Cell | None]:
-        """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
-
-        Raises:
-          InputError: if one is not free, or not joined with the rest of an `older` map that is shown.
-        """
-        given = {name: end for name in ENDS if (end := getattr(self, name)) is not None}
-        cells = {name: free_cell_of_place(name, end, maze) for name, end in given.items()}
-        for name, cell in cells.items():
-            if older is not None and not older.joined[cell]:
-                raise InputError(
-                    f"{name} {given[name]!r}: expected a cell that is free on the older map, too, found none"
-                )
-        joined = None if older is None else np.argwhere(older.joined)
-        corners = dict(zip(ENDS, corner_cells(maze, joined), strict=True)) if self.is_hierarchical else {}
-        start, goal = ((corners | cells).get(name) for name in ENDS)
-        return start, goal
-
-    def farthest(self, maze: Maze, older: OlderMap | None = None) -> int:
-        """Returns the largest distance in cells that start and goal can have in a maze, and on an `older` map of it."""
-        start, goal = self.ends(maze, older)
-        if start is not None and goal is not None:
-            return maze.distance(start, goal)
-        given = start or goal
-        if older is None:
-            return maze.diameter if given is None else int(maze.distances(given).max())
-
-        # Among the cells that are joined on the older map; a lower bound by a double sweep if no end is given.
-        cells = np.argwhere(older.joined)
-        if not len(cells):
-            return 0
-        if given is None:
-            near = maze.distances(tuple(cells[0]))[older.joined]
-            given = tuple(cells[near.argmax()])
-        return int(maze.distances(given)[older.joined].max())
-
-    # Their names in results.
-
-    @property
-    def setting(self) -> Self:
-        """The options without distances and what an agent chooses or is not told, by which results are grouped."""
-        left = [*_OF_AGENTS, "distances", "time_limit"]
-        left += [] if self.is_hierarchical else ["landmark_distance"]
-        left += [] if self.mazes is None else ["split"]
-        bare = {name: fields_of(type(self))[name].default for name in left}
-        return self.replace(**bare | {"sensors": (LIDAR,) if self.lidar_noise else ()})
-
-    @property
-    def title(self) -> str:
-        """The task, of a track its level, and of several goals their number: "rebuilt 2", "rebuilt 2, 3 goals"."""
-        goals = f", {self.num_goals} goals" if self.num_goals > 1 else ""
-        return (self.task if self.track is None else f"{self.task} {self._levels}") + goals
-
-    @property
-    def slug(self) -> str:
-        """Task and size, or track and level, and the perturbations, as names of files have them."""
-        strengths = "".join(f"-{name.rpartition('_')[2]}-{value:g}" for name, value in self.active_perturbations)
-        return (self.title.replace(" ", "-") if self.track else f"{self.task}-{self.size}") + strengths
-
-    @property
-    def noise_in_words(self) -> tuple[str, ...]:
-        """The noise on the senses that a user set, in words."""
-        noise = {"lidar noise": self.lidar_noise, "odometry noise": self.odometry_noise}
-        return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
-
-    @property
-    def sensors_in_words(self) -> str:
-        """The sensors, and the options of the camera that were changed: "lidar, egocentric (fov 170, look varied)"."""
-        words, changed = ", ".join(self.sensors), self.changed()
-        camera = [
-            f"{name.removeprefix('camera_')} {changed[name]}".removesuffix(".0")
-            for name in CAMERA_OPTIONS
-            if name in changed and PICTURES.keys() & {*self.sensors}
-        ]
-        return f"{words} ({', '.join(camera)})" if camera else words
-
-    @property
-    def own_in_words(self) -> tuple[str, ...]:
-        """The choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
-        scale = () if self.cell_size in (None, 1) else (f"cells of {self.cell_size:g} m",)
-        shown = () if self.shown is None else ("an older map shown",)
-        ends = (f"{name} {end}" for name in ENDS if (end := getattr(self, name)) is not None)
-        return (*scale, *shown, *ends, *self.noise_in_words)
-
-    @property
-    def _levels(self) -> str:
-        return ",".join(map(str, self.level or LEVELS[:1]))
-
-    def __str__(self) -> str:
-        parts = [self.task] if self.track is None else [self.task, f"level {self._levels}"]
-        parts += [f"{self.num_goals} goals"] * (self.num_goals > 1)
-        parts.append(f"{self.size} × {self.size}")
-        if self.split_in_results != "eval":
-            parts.append(f"{self.split_in_results} mazes")
-        parts += self.own_in_words
-        if self.is_hierarchical:
-            parts.append(f"landmarks every {self.landmark_distance}")
-        parts += [f"{name.replace('_', ' ')} {strength:g}" for name, strength in self.active_perturbations]
-        return ", ".join(parts)
-
-    def __lt__(self, other: TaskOptions) -> bool:
-        """Returns whether a table has these options above other ones."""
-        return self._order < other._order
-
-    @property
-    def _order(self) -> tuple[Any, ...]:
-        landmarks = self.landmark_distance if self.is_hierarchical else 0
-        of_mazes = str(self.mazes or ""), str(self.shown or ""), self.kinds, self.num_mazes or 0
-        of_track = self.track or "", self.level or (), self.num_goals
-        kind = self.track is not None, self.is_hierarchical, self.size or 0, self.split_in_results
-        return *kind, landmarks, self.active_perturbations, *of_mazes, *of_track, self.own_in_words
-
     # Which options go together.
 
     def _check(self) -> None:
@@ -500,7 +383,8 @@ class TaskOptions(SensorOptions, ReadOptions):
             raise InputError("exact_pose: expected a track whose pose is odometry beside it, found none")
         elif self.level is not None:
             raise InputError(
-                f"level {self._levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}"
+                f"level {','.join(map(str, self.level))}: expected a track beside it, found none; "
+                f"tracks: {', '.join(TRACKS)}"
             )
 
     def _require(self, beside: str, **wanted: Any) -> None:
@@ -527,7 +411,7 @@ class TaskOptions(SensorOptions, ReadOptions):
         if self.shown is not None and self.task == "rebuilt" and self.level not in (None, LEVELS[:1]):
             raise InputError(
                 f"{beside}: expected level 1 beside shown, an older map, for the other levels differ in doors only, "
-                f"found {self._levels}"
+                f"found {','.join(map(str, self.level))}"
             )
         if self.time_limit is not None:
             raise InputError(f"{beside}: has its own time limit, found time_limit {self.time_limit}")

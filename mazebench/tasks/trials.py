@@ -109,7 +109,7 @@ def select_trials(
       InputError: if no two cells of a maze are a wanted distance apart.
     """
     frozen_split = task.options.frozen_split
-    if frozen_split is not None and task.track is not None:
+    if frozen_split is not None and task.options.track is not None:
         trials = frozen_trials("local", task.size, TRACKS_BENCHMARK, frozen_split)
         are_frozen = task.options.num_goals > 1 and task.distances == DISTANCES
         later = frozen_legs(frozen_split, trials) if are_frozen else [()] * len(trials)
@@ -119,13 +119,13 @@ def select_trials(
             if trial.distance in task.distances and (index - trial.episode.maze) % FROZEN_PER_MAZE < episodes_per_maze
         ]
     if frozen_split is not None and task.options.is_hierarchical:
-        return list(frozen_trials(task.name, task.size))
+        return list(frozen_trials(task.options.task, task.size))
     wanted = episodes_per_distance or _PER_MAZE
     if frozen_split is not None and set(task.distances) <= set(EVAL_DISTANCES) and wanted <= EPISODES_PER_DISTANCE:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return [
             trial
-            for index, trial in enumerate(frozen_trials(task.name, task.size))
+            for index, trial in enumerate(frozen_trials(task.options.task, task.size))
             if index % EPISODES_PER_DISTANCE < wanted and trial.distance in task.distances
         ]
     return [with_later_legs(task, trial) for trial in draw_trials(task, episodes_per_distance, seed)]
@@ -164,8 +164,8 @@ def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DIS
       InputError: if no two cells of a maze are a wanted distance apart.
     """
     trials = []
-    for index, maze in enumerate(task.fixed_mazes):
-        (start, goal), joined = task.ends(index), task.joined(index)
+    for index, maze in enumerate(task.arena.fixed_mazes):
+        (start, goal), joined = task.arena.ends(index), task.arena.joined(index)
         if task.options.is_hierarchical:
             rng = np.random.default_rng([seed, maze.size, index])
             trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal, joined), rng))

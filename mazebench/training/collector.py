@@ -60,7 +60,7 @@ class Collector:
                 final_state=final_state,
                 final_cell=final_cell,
                 context=observation["context"],
-                sensors={name: observation[name] for name in self._task.sensors},
+                sensors={name: observation[name] for name in self._task.options.sensors},
                 notes=actor.notes(step.state),
             )
 

@@ -12,7 +12,8 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.task import Task, resolve_in
+from mazebench.tasks.arena import arena_of
+from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.task_options import SPARSE
 from mazebench.tasks.tracks import distance_of
 from mazebench.tasks.trials import draw_trials
@@ -33,9 +34,9 @@ class HeldOutEvaluation:
         """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track."""
         mazes = task.mazes
         all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
-        kinds = tuple(dict.fromkeys(all_kinds)) if task.shown is None else ()  # each once; own mazes have none
+        kinds = tuple(dict.fromkeys(all_kinds)) if task.arena.shown is None else ()  # each once; own mazes have none
         if not distances:
-            distances = _DISTANCES if task.track is None and kinds else task.options.distances or ()
+            distances = _DISTANCES if task.options.track is None and kinds else task.options.distances or ()
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
         self._distances = tuple(sorted({min(distances, key=lambda each: abs(each - wanted)) for wanted in spread}))
         plain = task.replace(distances=self._distances, num_goals=1, pairs="random", reward=SPARSE)
@@ -44,7 +45,7 @@ class HeldOutEvaluation:
             _draw_maze(plain, kinds[index % len(kinds)], f"held-out-{index}", stream)
             for index, stream in enumerate(streams if kinds else ())
         ]
-        self.task = resolve_in(drawn, plain.options) if drawn else plain
+        self.task = _in_mazes(plain, drawn) if drawn else plain
         self.trials = draw_trials(self.task, _EPISODES)
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
@@ -57,7 +58,7 @@ class HeldOutEvaluation:
         for results in run_trials(agent, self.task, dict(enumerate(self.trials)), len(self.trials)):
             for result in results:
                 cells = self.trials[result.number].distance
-                reached[distance_of(cells, self.task.cell_size, self.task.track)].append(result.success)
+                reached[distance_of(cells, self.task.cell_size, self.task.options.track)].append(result.success)
             num_ended += len(results)
             progress(num_ended, len(self.trials))
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
@@ -69,10 +70,15 @@ def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence)
     for draw in range(_MAX_DRAWS):
         maze = generate(kind, task.size, rng, name)
         try:
-            resolve_in([maze], task.options)
+            _in_mazes(task, [maze])
         except InputError:
             if draw == _MAX_DRAWS - 1:
                 raise
         else:
             break
     return maze
+
+
+def _in_mazes(task: Task, mazes: Sequence[Maze]) -> Task:
+    """Returns a task in other mazes, or raises `InputError` if it can't be played in one of them."""
+    return resolve(task.options, arena=arena_of(task.options, tuple(mazes)))

@@ -26,7 +26,7 @@ from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
 from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
-from mazebench.tasks.task import Task, as_options, in_the_same_mazes, resolve
+from mazebench.tasks.task import Task, as_asked, in_the_same_mazes, options_of, resolve
 from mazebench.tasks.task_options import PROGRESS, TaskOptions
 from mazebench.training.collector import Collector
 from mazebench.training.counters import Counters
@@ -91,8 +91,8 @@ def train(
 
     Args:
       agent: the name of an agent that learns, or "module:Class".
-      task: "local", the name of a track, or the names of several, of which each episode draws one; or a
-        `Task`, of which counts what was asked.
+      task: "local", the name of a track, or the names of several, of which each episode draws one; or a `Task`, which
+        is trained in as it is.
       out: the run folder.
       resume: go on from the last checkpoint in `out`.
       progress: called with the status after each step.
@@ -107,19 +107,19 @@ def train(
     of_training = {name: value for name, value in options_in(options, TrainOptions).items() if name != "task"}
     of_task = {name: value for name, value in options.items() if name not in of_training}
     names: Sequence[str] = (task,) if isinstance(task, str) else task if isinstance(task, Sequence) else ()
-    asked = as_options(names[0] if names else task, of_task)  # type: ignore[arg-type]
-    chosen = TrainOptions.of(of_training, agent=agent, task=tuple(names) or (asked.task,))
+    asked = as_asked(names[0] if names else task, of_task)  # type: ignore[arg-type]
+    chosen = TrainOptions.of(of_training, agent=agent, task=tuple(names) or (options_of(asked).task,))
     run_training(chosen, asked, pathlib.Path(out), resume, progress)
 
 
 def run_training(
     options: TrainOptions,
-    asked: TaskOptions,
+    asked: TaskOptions | Task,
     out: pathlib.Path,
     resume: bool = False,
     progress: Progress = lambda status: None,
 ) -> None:
-    """Trains an agent in the tasks that `options` name, as `asked` says."""
+    """Trains an agent in the tasks that `options` name, as `asked`, the first of them, says."""
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
         learning = []
@@ -130,11 +130,10 @@ def run_training(
     if len(options.task) > 1 and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.task)}")
     defaults = agent_class.task_options(options.overrides)
-    tasks = tuple(
-        training_task(options.agent, agent_class, defaults, asked.replace(task=name)) for name in options.task
-    )
+    wanted = [asked, *(asked.replace(task=name) for name in options.task[1:])]
+    tasks = tuple(training_task(options.agent, agent_class, defaults, each) for each in wanted)
     _check_together(options, tasks)
-    held_out = [HeldOutEvaluation(task, options.eval_mazes, asked.distances or ()) for task in tasks]
+    held_out = [HeldOutEvaluation(task, options.eval_mazes, options_of(asked).distances or ()) for task in tasks]
     tasks = in_the_same_mazes(tasks)
     learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=options.overrides)
     with RunFolder(out) as folder:
@@ -256,7 +255,7 @@ class TrainingLoop:
             rates = held_out.success_rates(
                 self._learner.actor.for_interface(held_out.task.interface), self._show_evaluation
             )
-            name = f"success_rate_{held_out.task.name}" if len(self._held_out) > 1 else "success_rate"
+            name = f"success_rate_{held_out.task.options.task}" if len(self._held_out) > 1 else "success_rate"
             metrics |= {f"{name}_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()
@@ -284,7 +283,7 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
 
 def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
     """Checks that tasks of several are tracks, and that goals can begin near."""
-    if len(tasks) > 1 and any(task.track is None for task in tasks):
+    if len(tasks) > 1 and any(task.options.track is None for task in tasks):
         raise InputError(f"expected different tracks, found {', '.join(options.task)}")
     if options.first_distance is None:
         return
@@ -305,17 +304,20 @@ def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: in
 
 
 def training_task(
-    agent: str, agent_class: type[LearningAgent], defaults: Mapping[str, Any], asked: TaskOptions
+    agent: str, agent_class: type[LearningAgent], defaults: Mapping[str, Any], asked: TaskOptions | Task
 ) -> Task:
     """Returns the task of a training; `defaults` are the learner's, for what `asked` leaves open."""
     check_names(defaults, TaskOptions)
-    given = asked.changed()
+    options = options_of(asked)
+    given = options.changed()
+    if isinstance(asked, Task):
+        del given["context_size"]  # which the agent chooses
     for name in FIXED:
         wanted = {"split": "train", "actions": "six"}.get(name, fields_of(TaskOptions)[name].default)
         if given.get(name, wanted) != wanted:
             raise InputError(f"expected {name} {wanted!r} in a training, found {given[name]!r}")
-    has_one_goal = asked.track is not None or asked.pairs == "fixed"
-    one_goal = {"num_goals": 1} if has_one_goal or asked.reward == PROGRESS else {}
+    has_one_goal = options.track is not None or options.pairs == "fixed"
+    one_goal = {"num_goals": 1} if has_one_goal or options.reward == PROGRESS else {}
     asked = asked.replace(**{name: value for name, value in defaults.items() if name not in given} | one_goal)
     task = resolve(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
     if needed := [name for name in agent_class.needs_shown if name in task.options.hide]:
@@ -340,10 +342,10 @@ def _save(
 def _origin(options: TrainOptions, tasks: Sequence[Task]) -> dict[str, Any]:
     """Returns what is trained, and in which tasks."""
     task, *others = tasks
-    values = task.to_json() | {"mazes": None if task.options.mazes is None else {"sha256": mazes_hash(task)}}
+    values = task.options.to_json() | {"mazes": None if task.options.mazes is None else {"sha256": mazes_hash(task)}}
     origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
     if others:
-        origin["also"] = [other.name for other in others]
+        origin["also"] = [other.options.task for other in others]
     if options.first_distance is not None:
         origin |= {"first_distance": options.first_distance, "widen_steps": options.widen_steps}
     return origin
