@@ -85,6 +85,17 @@ class TestResults:
         with pytest.raises(InputError, match="expected no options beside a Task, found size"):
             evaluate("random", task, size=31)
 
+    def test_a_task_is_played_in_its_own_mazes_at_its_own_distances(self, tmp_path):
+        path = tmp_path / "maze.txt"
+        path.write_text("#####\n#...#\n###.#\n#...#\n#####\n")
+        task = Task.of(mazes=path, distances=(2,))
+        path.unlink()  # it can't be read again
+        assert evaluate("oracle", task, episodes_per_distance=2).episodes == 2
+        local = evaluate("random", Task.of(size=13), episodes_per_distance=1)
+        assert (local.task.split, list(local.by_distance)) == ("train", ["1", "2", "3", "4", "5"])
+        with pytest.raises(InputError, match="expected no fresh mazes in an evaluation"):
+            evaluate("random", Task.of(fresh=True))
+
     def test_without_a_folder_the_summary_alone_is_left(self, planner_run, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         monkeypatch.setattr("tempfile.tempdir", str(tmp_path))

@@ -23,6 +23,7 @@ from mazebench.evaluation.evaluate import run_evaluation
 from mazebench.evaluation.plan import make_plan
 from mazebench.report.leaderboard import read_entries
 from mazebench.results.comparison import compare_folders
+from mazebench.results.naming import described, noise_in_words
 from mazebench.results.paper import printed_mmn
 from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, sample_episode
@@ -342,9 +343,9 @@ class TestResults:
         said = {"lidar_noise": "0.1,0.1", "odometry_noise": 0.0}
         assert said.items() <= summary.to_dict()["task"].items()
         assert said.items() <= result.records[0].model_dump().items()
-        assert result.summary.task.noise_in_words == ("lidar noise 0.1,0.1", "odometry noise 0.0")
+        assert noise_in_words(result.summary.task) == ("lidar noise 0.1,0.1", "odometry noise 0.0")
         assert printed_mmn(result.summary) == {}
-        assert "lidar noise 0.1,0.1" in str(result.summary.task)
+        assert "lidar noise 0.1,0.1" in described(result.summary.task)
 
     def test_they_are_named_where_two_results_are_compared(self, tmp_path):
         plain, noisy = (make_result(tmp_path / name) for name in ("plain", "noisy"))

@@ -24,6 +24,7 @@ from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, goals_of, sample_episode
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
+from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.trials import draw_trials
 
 HALL = dataclasses.replace(field(130), cell_size=0.5)
@@ -180,7 +181,8 @@ class TestMetres:
         half = Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1), "half", 0.5)
         whole, fine = (Task.of("building", mazes=each, distances=(15, 20)) for each in (maze, half))
         assert (whole.distances, fine.distances) == ((15, 20), (30, 40))
-        assert whole.longest_episode == fine.longest_episode == 170
+        for task in (whole, fine):
+            assert default_time_limit(max(task.distances), task.cell_size, track="building") == 170
         assert fine.options.distances == (15, 20)
 
     def test_records_keep_cells_and_summaries_have_metres(self, tmp_path):

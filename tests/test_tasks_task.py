@@ -17,6 +17,7 @@ from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.text import format_maze, parse_maze, write_text_maze
+from mazebench.results.naming import setting_of
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
@@ -56,20 +57,20 @@ class TestValue:
     )
     def test_a_task_goes_to_json_and_back(self, options):
         task = Task.of(**options)
-        again = Task.from_json(json.loads(json.dumps(task.to_json())))
+        again = Task.from_json(json.loads(json.dumps(task.options.to_json())))
         assert again == task
         assert again.mazes == task.mazes
-        assert [each.walls.tobytes() for each in again.shown or ()] == [
-            each.walls.tobytes() for each in task.shown or ()
+        assert [each.walls.tobytes() for each in again.arena.shown or ()] == [
+            each.walls.tobytes() for each in task.arena.shown or ()
         ]
 
     def test_results_do_not_name_the_reward_which_is_that_of_all_evaluations(self):
-        assert "reward" not in resolve_for_evaluation(TaskOptions()).to_json()
+        assert "reward" not in resolve_for_evaluation(TaskOptions()).options.to_json()
 
     def test_mazes_of_a_file_are_the_same_when_the_task_is_read_again(self, tmp_path):
         write_text_maze(CORRIDOR, tmp_path / "corridor.txt")
         task = Task.of(mazes=tmp_path / "corridor.txt", cell_size=0.6)
-        assert Task.from_json(task.to_json()).mazes == task.mazes == (resized(CORRIDOR, 0.6),)
+        assert Task.from_json(task.options.to_json()).mazes == task.mazes == (resized(CORRIDOR, 0.6),)
 
     def test_an_agent_learns_neither_the_track_nor_its_level(self):
         assert Task.of("building").interface == Task.of("rebuilt", level=3).interface
@@ -80,13 +81,42 @@ class TestValue:
             context_size=9
         )
         flipped = resolve_for_evaluation(TaskOptions(size=15, map_flip=0.1))
-        assert plain.options.setting == chosen.options.setting != flipped.options.setting
+        assert setting_of(plain.options) == setting_of(chosen.options) != setting_of(flipped.options)
 
     def test_options_that_evaluations_do_not_vary_are_refused(self):
         with pytest.raises(InputError, match="expected num_goals 1 in an evaluation, found 2"):
             resolve_for_evaluation(TaskOptions(num_goals=2))
         with pytest.raises(InputError, match="expected reward 'sparse' in an evaluation, found 'progress'"):
             resolve_for_evaluation(TaskOptions(reward="progress"))
+
+
+class TestArena:
+    """What was read and checked of mazes is held once."""
+
+    def test_another_option_keeps_what_was_read(self, tmp_path):
+        write_text_maze(CORRIDOR, tmp_path / "corridor.txt")
+        task = Task.of(mazes=tmp_path / "corridor.txt")
+        (tmp_path / "corridor.txt").unlink()  # it can't be read again
+        for changes in ({"distances": 2}, {"position_noise": 0.5}, {"actions": "diff"}, {"num_goals": 2}):
+            assert task.replace(**changes).arena is task.arena
+
+    def test_tasks_of_a_track_share_the_benchmarks_mazes(self):
+        task = Task.of("rebuilt", level=2)
+        assert task.replace(level=3, num_goals=2).arena is task.arena
+        assert Task.of("rebuilt", level=(1, 3), sensors="egocentric").arena is task.arena
+
+    def test_another_start_is_checked_in_the_same_mazes(self):
+        task = Task.of(mazes=CORRIDOR)
+        assert task.replace(start=(1, 1), distances=6).mazes is task.mazes
+        assert task.replace(start=(1, 1), distances=6).arena.ends(0) == ((1, 1), None)
+        with pytest.raises(InputError, match="start '2,1': corridor: expected a free cell"):
+            task.replace(start=(2, 1))
+        with pytest.raises(InputError, match="expected distances of at most 3 cells"):  # from the middle
+            task.replace(start=(1, 4), distances=4)
+
+    def test_other_mazes_are_read(self):
+        assert Task.of(size=13).replace(size=15).size == 15
+        assert Task.of("rebuilt", split="dev").replace(split="train").mazes != Task.of("rebuilt", split="dev").mazes
 
 
 class TestDistances:

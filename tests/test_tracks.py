@@ -79,7 +79,7 @@ class TestFiles:
 @pytest.mark.parametrize(("track", "level"), PLAYED)
 def test_the_task_of_a_level(track, level):
     spec = Task.of(track, level=level)
-    assert (spec.size, spec.options.lidar, spec.sensors) == (31, TURTLEBOT3, ("lidar",))
+    assert (spec.size, spec.options.lidar, spec.options.sensors) == (31, TURTLEBOT3, ("lidar",))
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)

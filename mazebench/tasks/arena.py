@@ -23,6 +23,7 @@ from mazebench.tasks.tracks import LEVELS, MAX_CELL_SIZE, TRACKS, cells_of, dist
 
 NUM_CHANGED = 4  # buildings in which things have changed since a plan of one's own was drawn
 
+_DEFAULTS = TaskOptions()
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 
 
@@ -38,7 +39,9 @@ class Arena:
     start: str | None = None  # of all episodes, as the option says; None if each draws one
     goal: str | None = None
     has_corners: bool = False  # whether episodes lead from corner to corner where no start or goal is given
-    _farthest: dict[int, int] = dataclasses.field(default_factory=dict, init=False, repr=False)  # by maze
+    # What was found: the farthest goals by maze, and the tracks and levels that all mazes can carry.
+    _farthest: dict[int, int] = dataclasses.field(default_factory=dict, init=False, repr=False)
+    _carried: set[tuple[str, int]] = dataclasses.field(default_factory=set, init=False, repr=False)
 
     @property
     def size(self) -> int:
@@ -99,6 +102,15 @@ class Arena:
             return (0,) * len(self.mazes)
         return tuple(int(maze.distances(tuple(maze.free_cells[0])).max()) for maze in self.fixed_mazes)
 
+    def require_levels(self, track: str, levels: Sequence[int]) -> None:
+        """Raises `InputError` if a track can't be played in a maze at some levels; fresh ones are tried when drawn."""
+        new = [level for level in levels if (track, level) not in self._carried]
+        if not new or self.shown is not None or isinstance(self.mazes, FreshMazes):
+            return
+        for maze in self.mazes:
+            TRACKS[track].require(maze, new)
+        self._carried.update((track, level) for level in new)
+
     def require_distances(self, distances: Sequence[int], track: str | None) -> None:
         """Raises `InputError` if no goal is as far away in a maze as wanted: in cells, on a track in metres."""
         if self.has_corners or (self.start and self.goal):
@@ -145,6 +157,8 @@ def arena_of(asked: TaskOptions, mazes: Mazes | None = None, shown: tuple[OlderM
     Raises:
       InputError: if a map can't be read, mazes are not of one size and scale, or the task can't be played in one.
     """
+    if mazes is None and not (asked.has_own or asked.is_drawn):
+        return _arena_of_benchmark(asked.task, asked.size, asked.split)
     if mazes is None:
         mazes, shown = _read(asked)
     if isinstance(mazes, FreshMazes):
@@ -155,9 +169,13 @@ def arena_of(asked: TaskOptions, mazes: Mazes | None = None, shown: tuple[OlderM
     require_one_size(mazes)
     for number, maze in enumerate(mazes):
         _check_maze(asked, maze, None if shown is None else shown[number])
-        if asked.track is not None and shown is None:
-            TRACKS[asked.track].require(maze, asked.level or LEVELS[:1])
     return _unchecked(asked, mazes, shown)
+
+
+@functools.lru_cache(maxsize=16)
+def _arena_of_benchmark(task: str, size: int | None, split: str | None) -> Arena:
+    asked = _DEFAULTS.filled(task=task, size=size, split=split)
+    return arena_of(asked, *_read(asked))
 
 
 def pixels_of_track(track: str, size: int) -> int:

@@ -26,9 +26,8 @@ _NOT_VARIED = ("pairs", "reward")
 NOT_IN_EVALUATIONS = ("fresh", *_NOT_VARIED, "context_size")  # agents choose the last one
 
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
-# Options by which mazes are read or drawn, and others on which it depends whether the task can be played in them.
+# Options by which mazes are read or drawn.
 _OF_MAZES = {"task", "size", "split", "mazes", "shown", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions)}
-_OF_CHECKS = {"level", "start", "goal"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,8 +74,8 @@ class Task:
         """Returns the task with other values of some options; the mazes are not read again unless they change."""
         options, arena = self.options.replace(**changes), None
         if not changes.keys() & (_OF_MAZES | {"level"} if self.changes_buildings else _OF_MAZES):
-            are_checked = not changes.keys() & _OF_CHECKS
-            arena = self.arena if are_checked else arena_of(options, self.mazes, self.arena.shown)
+            has_ends = changes.keys() & {"start", "goal"}
+            arena = arena_of(options, self.mazes, self.arena.shown) if has_ends else self.arena
         task = resolve(options, arena=arena)
         return task if "context_size" in changes else dataclasses.replace(task, context_size=self.context_size)
 
@@ -180,6 +179,8 @@ def resolve(
         return asked.replace(context_size=wanted)
     arena = arena or arena_of(asked)
     split, level = asked.split or "train", asked.level or (() if asked.track is None else LEVELS[:1])
+    if asked.track is not None:
+        arena.require_levels(asked.track, level)
     context_size = _context_size(asked, arena.size, context_size_of or default_context_size)
 
     # The distances that fit the mazes, and a time limit in which goals of one's own are reached.
