@@ -103,7 +103,12 @@ def make_result(
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
         "python": "3.11.7",
     }
-    content = {"agent": agent, "task": spec.options.to_json(), "benchmark": spec.options.benchmark, "episodes": len(records)}
+    content = {
+        "agent": agent,
+        "task": spec.options.to_json(),
+        "benchmark": spec.options.benchmark,
+        "episodes": len(records),
+    }
     write_json(folder / SUMMARY, content | {"provenance": origin, "privileged": privileged})
     return _set_means(folder, records)
 

@@ -58,8 +58,8 @@ class TestParts:
         assert paper["local-13"].distances == tuple(range(1, 16))
         assert paper["local-21"].size == 21
         corners, flipped = paper["hierarchical-13-k2"], paper["flip-0.3"]
-        assert (corners.name, corners.options.landmark_distance) == ("hierarchical", 2)
-        assert (flipped.name, flipped.options.map_flip) == ("hierarchical", 0.3)
+        assert (corners.options.task, corners.options.landmark_distance) == ("hierarchical", 2)
+        assert (flipped.options.task, flipped.options.map_flip) == ("hierarchical", 0.3)
         assert (paper["warp-0.1"].distances, paper["warp-0.1"].options.map_warp) == ((2, 4, 6, 8, 10), 0.1)
         assert (paper["noise-1.0"].distances, paper["noise-1.0"].options.position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
@@ -67,7 +67,11 @@ class TestParts:
     def test_tracks_by_camera_alone_are_the_tracks_with_pictures_in_place_of_the_lidar(self, split):
         for part, by_camera in zip(SUITES[f"tracks{split}"], SUITES[f"tracks-camera{split}"], strict=True):
             task = resolve_for_evaluation(by_camera.task)
-            assert (task.sensors, task.options.look, task.options.camera[:2]) == (("egocentric",), "varied", (64, 75))
+            assert (task.options.sensors, task.options.look, task.options.camera[:2]) == (
+                ("egocentric",),
+                "varied",
+                (64, 75),
+            )
             assert task.options.is_unseen
             assert (by_camera.name, task.replace(sensors=(), look="plain")) == (
                 part.name,
