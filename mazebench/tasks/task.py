@@ -63,7 +63,7 @@ class Task:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Task:
-        """Returns the task of which `to_json` returned the content.
+        """Returns the task whose options `TaskOptions.to_json` returned.
 
         Raises:
           InputError: as `of`.
