@@ -23,6 +23,7 @@ import numpy as np
 from safetensors.numpy import load_file
 
 import mazebench
+from mazebench.constants import ADRIFT, BUILDING, REBUILT, ROUGH
 from mazebench.maps.benchmark import (
     ALL_SPLITS,
     FROZEN_SPLITS,
@@ -44,7 +45,7 @@ PAPER_SETTINGS: dict[str, dict[str, Any]] = {
     "warp": {"map_warp": 0.1},
     "noise": {"position_noise": 0.5},
 }
-TRACKS = {"building": 1, "rebuilt": 2, "adrift": 3, "rough": 3}  # the level of each
+TRACKS = {BUILDING: 1, REBUILT: 2, ADRIFT: 3, ROUGH: 3}  # the level of each
 COLUMNS = ("episode", "maze", "seed", "success", "steps", "path_length")
 VARIANTS: dict[str, dict[str, Any]] = {
     "local": {"size": 13},

@@ -32,7 +32,7 @@ class Undoing(ClosedLoopPlanner):
             ends = tuple(tuple(np.argwhere(planes[plane])[0].tolist()) for plane in (START, GOAL))
             seed = self.episode_seeds.get(int(seed), int(seed))
             rng = Episode(0, *ends, 0.0, seed).stream(MapFlip.stream)
-            planes[GLOBAL_MAP] = MapFlip(0.1).show(ShownMap(planes[GLOBAL_MAP] > 0.5), ends, rng).walls
+            planes[GLOBAL_MAP] = MapFlip(0.1).shown(ShownMap(planes[GLOBAL_MAP] > 0.5), ends, rng).walls
         return super().act(inputs._replace(observation={**inputs.observation, "context": context}), state, explore)
 
 

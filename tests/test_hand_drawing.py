@@ -36,7 +36,7 @@ def maze(seed):
 
 def drawing(bend, seed):
     shown = ShownMap(maze(seed))
-    return HandDrawnMap(bend).show(shown, ((1, 1), (1, 1)), np.random.default_rng(seed)).drawing
+    return HandDrawnMap(bend).shown(shown, ((1, 1), (1, 1)), np.random.default_rng(seed)).drawing
 
 
 def plain(share=(1.0, 1.0), place=(0.0, 0.0), thickening=0.0):

@@ -22,7 +22,7 @@ def sketched(seed, level, kind="dfs"):
     rng = np.random.default_rng(seed)
     maze = generate(kind, SIZE, rng)
     start, goal = sample_pair(maze, 8, rng)
-    shown = HandDrawnMap(bend=level / 2).show(ShownMap(maze.walls), ((1, 1), (1, 1)), rng)
+    shown = HandDrawnMap(bend=level / 2).shown(ShownMap(maze.walls), ((1, 1), (1, 1)), rng)
     return maze, start, goal, build_context(shown.seen_walls, shown.seen_cell(start), shown.seen_cell(goal), 2 * SIZE)
 
 

@@ -87,7 +87,7 @@ class TestExactOdometry:
 
 
 def corrupted_odometry(seed: int) -> Odometry:
-    return LostPose(drifts=True).state_error(np.random.default_rng(seed))
+    return LostPose(drifts=True).observed(np.random.default_rng(seed))
 
 
 class TestCorruptedOdometry:

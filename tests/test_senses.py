@@ -28,9 +28,8 @@ from mazebench.results.paper import printed_mmn
 from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import state_errors
-from mazebench.tasks.perturbations.odometry import NoisyMotion
-from mazebench.tasks.sensors.lidar import read
-from mazebench.tasks.sensors.sensor import SensorOptions
+from mazebench.tasks.perturbations.odometry import MotionNoise, NoisyMotion
+from mazebench.tasks.sensors.lidar import LidarOptions, read
 from mazebench.tasks.task import Task
 from mazebench.world.angles import wrap_angle
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
@@ -74,9 +73,9 @@ class TestLidar:
         ],
     )
     def test_the_option_names_a_model(self, text, model):
-        options = SensorOptions(lidar_noise=text)
+        options = LidarOptions(lidar_noise=text)
         assert options.lidar == model
-        assert SensorOptions(lidar_noise=options.lidar_noise) == options
+        assert LidarOptions(lidar_noise=options.lidar_noise) == options
 
     def test_the_sensor_sees_as_far_as_the_model(self):
         spec = Task.of(sensors="lidar", lidar_noise="turtlebot3")
@@ -310,9 +309,13 @@ class TestOptions:
 
     def test_a_track_has_senses_of_its_own_unless_others_are_set(self):
         spec = Task.of("adrift", level=(1, 3))
-        assert (spec.options.lidar, spec.odometry_noise_at(1), spec.odometry_noise_at(3)) == (TURTLEBOT3, 0.01, 0.2)
+        assert spec.options.lidar == TURTLEBOT3
+        assert MotionNoise(0.01) in spec.perturbations(1)
+        assert MotionNoise(0.2) in spec.perturbations(3)
+        assert spec.interface.odometry_noise == 0.2
         other = spec.replace(lidar_noise="0,0", odometry_noise=0.0)
-        assert (other.options.lidar, other.odometry_noise_at(3)) == (LidarModel(), 0.0)
+        assert (other.options.lidar, other.interface.odometry_noise) == (LidarModel(), 0.0)
+        assert not any(isinstance(each, MotionNoise) for each in other.perturbations(3))
 
         # The noise of an episode is that of its level.
         rng = np.random.default_rng(0)

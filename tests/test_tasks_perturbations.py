@@ -19,7 +19,7 @@ def maze():
 
 
 def flip(maze, probability, rng):
-    return MapFlip(probability).show(ShownMap(maze.walls), corner_cells(maze), rng).walls
+    return MapFlip(probability).shown(ShownMap(maze.walls), corner_cells(maze), rng).walls
 
 
 class TestFlip:

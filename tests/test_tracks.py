@@ -82,7 +82,7 @@ def test_the_task_of_a_level(track, level):
     assert (spec.size, spec.options.lidar, spec.options.sensors) == (31, TURTLEBOT3, ("lidar",))
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
-    assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
+    assert spec.interface.odometry_noise == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
     assert default_time_limit(20, 1.0, track=track) == (270 if is_lost else 170)
     env = mazebench.load(track, level=level, seed=0)
     state = env.reset().observation["state"]
@@ -109,7 +109,7 @@ class TestBuilding:
     def test_points_and_cells_lie_at_the_same_place_of_the_map(self, seed):
         maze = generate("house", 21, np.random.default_rng(seed))
         turned, rng = TurnedMap(turns=True, mirrors=True), np.random.default_rng(seed)
-        shown = turned.show(ShownMap(maze.walls), ((1, 1), (1, 1)), rng)
+        shown = turned.shown(ShownMap(maze.walls), ((1, 1), (1, 1)), rng)
         cell = tuple(maze.free_cells[seed].tolist())
         x, y = shown.seen_points(np.array([[cell[1] + 0.5, 21 - cell[0] - 0.5]]))[0]
         assert (int(21 - y), int(x)) == shown.seen_cell(cell)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, RENDERING, TASK_VERSION
+from mazebench.constants import BENCHMARK_SIZES, RENDERING, TASK_VERSION, TRACK_NAMES
 from mazebench.errors import InputError
 from mazebench.world.backend import load_mujoco, loading_backend
 
@@ -39,7 +39,7 @@ def register_environments() -> None:
         for task in ("local", "hierarchical"):
             _register(f"{task.title()}-{size}", "make", "make_vec", task=task, id_size=size)
         _register(f"LocalGoal-{size}", "make_goal", id_size=size)
-    for track in ("building", "rebuilt", "adrift", "rough"):  # those of `TRACKS`, whose import takes long
+    for track in TRACK_NAMES:
         _register(track.title(), "make", "make_vec", task=track)
 
 

@@ -237,8 +237,7 @@ def to_record(plan: Plan, result: Result) -> Record:
     optional = {
         "cell_size": None if task.cell_size == 1 else task.cell_size,
         "level": task.options.track_level if is_track else None,
-        "lidar_noise": task.options.lidar_noise,
-        "odometry_noise": task.options.odometry_noise,
+        **task.options.noise,
         **task.options.perturbations,
         # Summaries report the episodes of each of these groups apart.
         "blocked": result.blocked if is_track else None,

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from mazebench.options import fields_of
-from mazebench.tasks.sensors import LIDAR
-from mazebench.tasks.sensors.sensor import CAMERA_OPTIONS
+from mazebench.tasks.sensors import CHOICES_OF_SENSORS, NOISE_OF_SENSORS, SENSORS
 from mazebench.tasks.task_options import ENDS, TaskOptions
 from mazebench.tasks.tracks import LEVELS
-from mazebench.world.looks import PICTURES
 
 # Options that an agent may choose, or is not told, while the same is played.
-_OF_AGENTS = ("actions", "sensors", *CAMERA_OPTIONS, "hide", "exact_pose", "context_size")
+_OF_AGENTS = ("actions", "sensors", *CHOICES_OF_SENSORS, "hide", "exact_pose", "context_size")
 
 
 def setting_of(options: TaskOptions) -> TaskOptions:
@@ -21,7 +19,8 @@ def setting_of(options: TaskOptions) -> TaskOptions:
     left += [] if options.is_hierarchical else ["landmark_distance"]
     left += [] if options.mazes is None else ["split"]
     bare = {name: fields_of(TaskOptions)[name].default for name in left}
-    return options.replace(**bare | {"sensors": (LIDAR,) if options.lidar_noise else ()})
+    noisy = tuple(NOISE_OF_SENSORS[name] for name in options.noise if name in NOISE_OF_SENSORS)
+    return options.replace(**bare | {"sensors": noisy})
 
 
 def title_of(options: TaskOptions) -> str:
@@ -54,19 +53,19 @@ def own_in_words(options: TaskOptions) -> tuple[str, ...]:
 
 def noise_in_words(options: TaskOptions) -> tuple[str, ...]:
     """Returns the noise on the senses that a user set, in words."""
-    noise = {"lidar noise": options.lidar_noise, "odometry noise": options.odometry_noise}
-    return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
+    return tuple(f"{name.replace('_', ' ')} {value}" for name, value in options.noise.items())
 
 
 def sensors_in_words(options: TaskOptions) -> str:
-    """Returns the sensors, and what was changed of the camera: "lidar, egocentric (fov 170, look varied)"."""
+    """Returns the sensors, and what an agent changed of them: "lidar, egocentric (fov 170, look varied)"."""
     words, changed = ", ".join(options.sensors), options.changed()
-    camera = [
-        f"{name.removeprefix('camera_')} {changed[name]}".removesuffix(".0")
-        for name in CAMERA_OPTIONS
-        if name in changed and PICTURES.keys() & {*options.sensors}
+    theirs = {name for sensor in options.sensors for name in fields_of(SENSORS[sensor].options)}
+    values = [
+        f"{name.rpartition('_')[2]} {changed[name]}".removesuffix(".0")
+        for name in CHOICES_OF_SENSORS
+        if name in changed and name in theirs
     ]
-    return f"{words} ({', '.join(camera)})" if camera else words
+    return f"{words} ({', '.join(values)})" if values else words
 
 
 def order(options: TaskOptions) -> tuple[Any, ...]:

@@ -18,6 +18,7 @@ from mazebench.maps.older_map import OlderMap
 from mazebench.maps.places import free_cell_of_place
 from mazebench.maps.selection import maps_in_texts
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
+from mazebench.tasks.perturbations.perturbation import Of, Perturbation
 from mazebench.tasks.task_options import DRAWN_KINDS, ENDS, NUM_DRAWN, TaskOptions
 from mazebench.tasks.tracks import LEVELS, MAX_CELL_SIZE, TRACKS, cells_of, distance_of
 
@@ -233,27 +234,27 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
 
 
 def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...] | None]:
-    """Returns buildings in which things have changed since their plans were drawn, if doors have moved on the track.
+    """Returns the true buildings of mazes of one's own, their plans, if buildings differ from maps on the track.
 
     Raises:
-      InputError: if none of the plans can carry the strength of the level, or levels differ in it.
+      InputError: if none of the plans can be changed so, or levels differ in it.
     """
     track = asked.task
-    strengths = {TRACKS[track].levels[level - 1].strength for level in asked.level or LEVELS[:1]}
-    if len(strengths) > 1:
+    changes = {TRACKS[track].levels[level - 1].of(Of.BUILDING) for level in asked.level or LEVELS[:1]}
+    if len(changes) > 1:
         found = ", ".join(map(str, asked.level or ()))
         raise InputError(
             f"track {track!r}: expected one level in mazes of your own, whose changes depend on it, found {found}"
         )
-    [strength] = strengths
-    if strength is None:
+    [perturbations] = changes
+    if not perturbations:
         return plans, None
 
     shown: list[OlderMap] = []
 
     def change(plan: Maze) -> None:
         _check_maze(asked, plan)
-        shown.extend(OlderMap(plan.walls, maze) for maze in _changed(plan, plan.name, plan.kind, strength))
+        shown.extend(OlderMap(plan.walls, maze) for maze in _buildings(plan, plan.name, plan.kind, perturbations))
 
     pixels_of_track(track, plans[0].size)  # what takes a moment is checked first
     _playable(plans, change)
@@ -261,11 +262,15 @@ def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> tuple[tuple[Ma
 
 
 @functools.lru_cache(maxsize=32)
-def _changed(plan: Maze, name: str, kind: str, strength: int) -> tuple[Maze, ...]:
-    """Returns the changed buildings of a plan; name and kind are its own, for plans of equal walls are equal."""
-    from mazebench.maps.changes import changed_buildings  # which needs numba
-
-    return changed_buildings(plan, strength, NUM_CHANGED, seed=0)
+def _buildings(plan: Maze, name: str, kind: str, perturbations: tuple[Perturbation, ...]) -> tuple[Maze, ...]:
+    """Returns the true buildings of a plan; name and kind are its own, for plans of equal walls are equal."""
+    buildings = [plan] * NUM_CHANGED
+    for place, perturbation in enumerate(perturbations):
+        rngs = (np.random.default_rng([place, number]) for number in range(NUM_CHANGED))
+        buildings = [perturbation.building(*each) for each in zip(buildings, rngs, strict=True)]
+    return tuple(
+        dataclasses.replace(building, name=f"{name}-changed-{number}") for number, building in enumerate(buildings, 1)
+    )
 
 
 def _check_maze(asked: TaskOptions, maze: Maze, older: OlderMap | None = None) -> None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
-from mazebench.tasks.perturbations.moved_doors import MovedDoors
-from mazebench.tasks.perturbations.perturbation import Perturbation
+from mazebench.tasks.perturbations.perturbation import Of, Perturbation
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -53,14 +52,11 @@ def episode_level(task: Task, episode: Episode) -> int:
     return task.levels[int(episode.stream(Stream.LEVEL).integers(len(task.levels)))]
 
 
-def perturbations_of(task: Task, episode: Episode) -> list[tuple[Perturbation, np.random.Generator]]:
-    """Returns the perturbations of `episode`, in the order in which they apply, each with a generator of its stream."""
-    perturbations = [PERTURBATIONS[name](strength) for name, strength in task.options.active_perturbations]
-    if task.options.track is not None:
-        of_level = TRACKS[task.options.track].levels[episode_level(task, episode) - 1].perturbations
-        # An older map of the building tells what has changed instead of doors that are drawn.
-        perturbations += [each for each in of_level if task.arena.shown is None or not isinstance(each, MovedDoors)]
-    return [(perturbation, episode.stream(perturbation.stream)) for perturbation in perturbations]
+def perturbations_of(task: Task, episode: Episode, *things: Of) -> Iterator[tuple[Perturbation, np.random.Generator]]:
+    """Yields the perturbations of some things in `episode`, as they apply, each with a generator of its stream."""
+    for perturbation in task.perturbations(episode_level(task, episode)):
+        if perturbation.of in things:
+            yield perturbation, episode.stream(perturbation.stream)
 
 
 def goals_of(task: Task, episode: Episode) -> tuple[Cell, ...]:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from dm_env import specs
 
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode, episode_level, perturbations_of
-from mazebench.tasks.perturbations.odometry import NoisyMotion
-from mazebench.tasks.perturbations.perturbation import StateError
+from mazebench.tasks.episode import Episode, perturbations_of
+from mazebench.tasks.perturbations.perturbation import Of, StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import Sensor, Worlds
-from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.world.simulation import STATE_SIZE
+
+Noise = tuple[np.random.Generator | None, ...]  # by sensor: of what is drawn in one episode; None if nothing is
 
 
 def observation_specs(task: Task) -> dict[str, specs.Array]:
@@ -30,12 +31,8 @@ def observation_specs(task: Task) -> dict[str, specs.Array]:
 
 def state_errors(task: Task, episode: Episode) -> list[StateError]:
     """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
-    if task.options.exact_pose:
-        return []
-    errors = [perturbation.state_error(rng) for perturbation, rng in perturbations_of(task, episode)]
-    alpha = task.odometry_noise_at(episode_level(task, episode))
-    noise = NoisyMotion(alpha, episode.stream(Stream.MOTION_NOISE)) if alpha else None
-    return [error for error in (noise, *errors) if error is not None]
+    errors = (perturbation.observed(rng) for perturbation, rng in perturbations_of(task, episode, Of.SENSES))
+    return [error for error in errors if error is not None]
 
 
 class OpenSensors:
@@ -43,7 +40,7 @@ class OpenSensors:
 
     def __init__(self, task: Task):
         self._task = task
-        names: dict[type[Sensor], list[str]] = {}
+        names: dict[type[Sensor[Any]], list[str]] = {}
         for name in task.options.sensors:
             names.setdefault(SENSORS[name], []).append(name)
         self._sensors = [kind(tuple(of_kind), task.options, task.mazes) for kind, of_kind in names.items()]
@@ -52,6 +49,16 @@ class OpenSensors:
         """Makes copies open sensors of their own."""
         return OpenSensors, (self._task,)
 
-    def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
-        """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds."""
-        return {name: values for sensor in self._sensors for name, values in sensor.read(worlds).items()}
+    def begin(self, episode: Episode | None) -> Noise:
+        """Returns the generators of the sensors' noise in an episode that begins; without one, nothing is drawn."""
+        return tuple(
+            None if episode is None or sensor.stream is None else episode.stream(sensor.stream)
+            for sensor in self._sensors
+        )
+
+    def read(self, worlds: Worlds, noise: Sequence[Noise]) -> dict[str, np.ndarray]:
+        """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds; `noise` (`[K]`) is that of their episodes."""
+        observed: dict[str, np.ndarray] = {}
+        for sensor, rngs in zip(self._sensors, zip(*noise, strict=True), strict=True):
+            observed |= sensor.read(worlds._replace(rngs=rngs))
+        return observed

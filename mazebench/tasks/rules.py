@@ -10,16 +10,14 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, episode_level
-from mazebench.tasks.observation import OpenSensors, state_errors
+from mazebench.tasks.observation import Noise, OpenSensors, state_errors
 from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
-from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.angles import wrap_angle
-from mazebench.world.looks import VARIED
 
 _UNKNOWN = -1  # a way that would take long to measure
 _INFOS = (  # what `Rules.infos` describes, in this order
@@ -80,8 +78,7 @@ class Rules:
         self.shown: list[ShownMap | None] = [None] * num_envs
         self.routes: list[Route | None] = [None] * num_envs
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
-        self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
-        self._picture_noise: list[np.random.Generator | None] = [None] * num_envs
+        self._noise: list[Noise] = [self._sensors.begin(None)] * num_envs
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
         self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", task.options.track or ""))
         self.blocked = np.zeros(num_envs, dtype=bool)
@@ -113,7 +110,7 @@ class Rules:
         """
         self.episodes[i], self.active[i] = episode, episode is not None
         self.is_first[i] = self.reached[i] = self.timed_out[i] = self.goal_reached[i] = False
-        self._state_errors[i], self._lidar_noise[i], self._picture_noise[i] = [], None, None
+        self._state_errors[i], self._noise[i] = [], self._sensors.begin(episode)
         if episode is None:
             return
 
@@ -122,11 +119,6 @@ class Rules:
         self.shown[i] = shown = show_map(task, episode)
         self.routes[i] = route = plan_route(task, episode, shown)
         self._state_errors[i] = state_errors(task, episode)
-        if "lidar" in task.options.sensors and task.options.lidar.is_random:
-            self._lidar_noise[i] = episode.stream(Stream.LIDAR_NOISE)
-        if task.options.look == VARIED:
-            self._picture_noise[i] = episode.stream(Stream.PICTURE_NOISE)
-
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
         self.level[i] = 0 if task.options.track is None else episode_level(task, episode)
@@ -247,15 +239,9 @@ class Rules:
                     add_error(state)
         observed = {"state": states.astype(np.float32)}
         if self.task.options.sensors:
-            worlds = Worlds(
-                self.maze[indices],
-                self.pose[indices],
-                self.marker[indices],
-                [self._lidar_noise[i] for i in indices.tolist()],
-                [self._picture_noise[i] for i in indices.tolist()],
-                self._num_threads,
-            )
-            observed |= self._sensors.read(worlds)
+            noise = [self._noise[i] for i in indices.tolist()]
+            worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], self._num_threads)
+            observed |= self._sensors.read(worlds, noise)
         return observed
 
     def infos(self) -> dict[str, np.ndarray]:

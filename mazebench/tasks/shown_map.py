@@ -7,7 +7,7 @@ import numpy as np
 from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
 from mazebench.tasks.episode import Episode, goals_of, perturbations_of
-from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.perturbations.perturbation import Of, ShownMap
 from mazebench.tasks.task import Task
 
 _GREY_LEVELS = np.float32(255)
@@ -20,8 +20,8 @@ def show_map(task: Task, episode: Episode) -> ShownMap:
     walls = maze.walls if task.arena.shown is None else task.arena.shown[episode.maze].walls
     shown = ShownMap(walls, kind=maze.kind, cell_size=maze.cell_size)
     ends = (episode.start, *goals_of(task, episode))
-    for perturbation, rng in perturbations_of(task, episode):
-        shown = perturbation.show(shown, ends, rng)
+    for perturbation, rng in perturbations_of(task, episode, Of.MAP, Of.BUILDING):
+        shown = perturbation.shown(shown, ends, rng)
     return shown
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,11 +15,12 @@ from mazebench.options import check_names, fields_of
 from mazebench.tasks.arena import Arena, arena_of, pixels_of_track
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.interface import Interface
-from mazebench.tasks.sensors import LIDAR
+from mazebench.tasks.perturbations import OF_OPTION
+from mazebench.tasks.perturbations.perturbation import Of, Perturbation
+from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.task_options import DRAWN_KINDS, HIERARCHICAL, LOCAL, NUM_DRAWN, TaskOptions
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS, cells_of
-from mazebench.world.looks import PICTURES
 
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
@@ -129,17 +131,26 @@ class Task:
         """True if the context may change within an episode: at landmarks, or where one goal follows another."""
         return self.options.is_hierarchical or self.options.num_goals > 1
 
-    def odometry_noise_at(self, level: int) -> float:
-        """Returns alpha of the noise on the observed motion at a level: as the option says, or the track."""
-        noise = self.options.odometry_noise
-        if noise is not None or self.options.track is None or self.options.exact_pose:
-            return noise or 0.0
-        return TRACKS[self.options.track].levels[level - 1].odometry_noise
+    def perturbations(self, level: int) -> list[Perturbation]:
+        """Returns those of the options and of a level of the track, in the order in which they apply."""
+        options = self.options
+        strengths = {name: strength for name in OF_OPTION if (strength := getattr(options, name)) is not None}
+        found = [OF_OPTION[name](strength) for name, strength in strengths.items() if strength]
+        if options.track is not None:
+            left_out = {Of.BUILDING: self.arena.shown is not None, Of.SENSES: options.exact_pose}
+            of_level = TRACKS[options.track].levels[level - 1].perturbations
+            found += [each for each in of_level if not left_out.get(each.of) and each.option not in strengths]
+        return found
 
     @property
     def interface(self) -> Interface:
         """The part of the task that an agent may know: neither the track nor its level."""
         options = self.options
+        told: dict[str, Any] = {}
+        for perturbation in itertools.chain(*map(self.perturbations, self.levels or LEVELS[:1])):
+            told |= {name: max(value, told.get(name, value)) for name, value in perturbation.told().items()}
+        for sensor in options.sensors:
+            told |= SENSORS[sensor].told(options)
         return Interface(
             HIERARCHICAL if options.is_hierarchical else LOCAL,
             self.size,
@@ -148,9 +159,7 @@ class Task:
             sensors=options.sensors,
             cell_size=self.cell_size,
             hidden=options.hide,
-            lidar=options.lidar if LIDAR in options.sensors else None,
-            camera=options.camera if PICTURES.keys() & {*options.sensors} else None,
-            odometry_noise=max(map(self.odometry_noise_at, self.levels or LEVELS[:1])),
+            **told,
         )
 
 

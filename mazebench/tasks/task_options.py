@@ -26,12 +26,11 @@ from mazebench.maps.places import place_text
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes, texts_of
 from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
+from mazebench.tasks.perturbations import OF_OPTION
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
-from mazebench.tasks.sensors import LIDAR, SENSORS
-from mazebench.tasks.sensors.sensor import CAMERA_OPTIONS, SensorOptions
+from mazebench.tasks.sensors import CHOICES_OF_SENSORS, LIDAR, NOISE_OF_SENSORS, SENSORS, AllSensorOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.looks import PICTURES
-from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
 LOCAL, HIERARCHICAL = "local", "hierarchical"
 TASK_NAMES = (LOCAL, HIERARCHICAL, *TRACKS)
@@ -44,6 +43,7 @@ MOST_GOALS = 5  # of an episode on a track, all of which its shown map keeps fre
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
+_NOISE = (*NOISE_OF_SENSORS, *(name for name in OF_OPTION if name not in PERTURBATIONS))
 _RETIRED = (("textures", False), ("walls", "filled"))  # options of earlier versions, and the values that said nothing
 
 
@@ -57,7 +57,7 @@ def _as_mazes(mazes: Any) -> Any:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class TaskOptions(SensorOptions, ReadOptions):
+class TaskOptions(AllSensorOptions, ReadOptions):
     """The options of a task: what was asked. None is open; `Task` fills it.
 
         >>> options = mazebench.Task.of("rebuilt", level=2).options
@@ -248,7 +248,7 @@ class TaskOptions(SensorOptions, ReadOptions):
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
         changed = self.changed()
-        left = {name for name in ("reward", *CAMERA_OPTIONS) if name not in changed}
+        left = {name for name in ("reward", *CHOICES_OF_SENSORS) if name not in changed}
         values = {name: value for name, value in vars(self).items() if value is not None and name not in left}
         if self.mazes is not None:  # a path may have bytes that JSON has not
             own = self.mazes
@@ -328,9 +328,10 @@ class TaskOptions(SensorOptions, ReadOptions):
         return self.track is None and not self.active_perturbations
 
     @property
-    def lidar(self) -> LidarModel:
-        """The model of the sensor `lidar`: as the option says, or the track."""
-        return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
+    def noise(self) -> dict[str, Any]:
+        """The noise on the senses that a user set, by option."""
+        values = {name: getattr(self, name) for name in _NOISE}
+        return {name: value for name, value in values.items() if value is not None}
 
     @property
     def is_unseen(self) -> bool:
@@ -368,9 +369,10 @@ class TaskOptions(SensorOptions, ReadOptions):
             self._require(f"num_goals {self.num_goals}", task=task, pairs="random", goal=None, reward=SPARSE)
         if self.num_ends:
             self._require("a start or a goal", pairs="random")
-        if self.lidar_noise is not None and LIDAR not in self.sensors:
-            found = ", ".join(self.sensors) or "none"
-            raise InputError(f"lidar_noise {self.lidar_noise}: expected the sensor lidar, found {found}")
+        for noise, name in NOISE_OF_SENSORS.items():
+            if (value := getattr(self, noise)) is not None and name not in self.sensors:
+                found = ", ".join(self.sensors) or "none"
+                raise InputError(f"{noise} {value}: expected the sensor {name}, found {found}")
         if self.odometry_noise:
             self._require(f"odometry_noise {self.odometry_noise:g}", position_noise=0.0, exact_pose=False)
         if self.hide:
@@ -408,7 +410,7 @@ class TaskOptions(SensorOptions, ReadOptions):
         track, beside = TRACKS[self.task], f"track {self.task!r}"
         if self.mazes is None and not self.is_drawn and self.size not in (None, KINDS_SIZE):
             raise InputError(f"{beside}: expected size {KINDS_SIZE}, found {self.size}")
-        if self.shown is not None and self.task == "rebuilt" and self.level not in (None, LEVELS[:1]):
+        if self.shown is not None and track.differs_in_building and self.level not in (None, LEVELS[:1]):
             raise InputError(
                 f"{beside}: expected level 1 beside shown, an older map, for the other levels differ in doors only, "
                 f"found {','.join(map(str, self.level))}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from mazebench.constants import ADRIFT, BUILDING, REBUILT, ROUGH
 from mazebench.maps.maze import Maze
 from mazebench.tasks.perturbations.hand_drawing import HandDrawnMap
 from mazebench.tasks.perturbations.moved_doors import MovedDoors
-from mazebench.tasks.perturbations.odometry import LostPose
-from mazebench.tasks.perturbations.perturbation import Perturbation
+from mazebench.tasks.perturbations.odometry import LostPose, MotionNoise
+from mazebench.tasks.perturbations.perturbation import Of, Perturbation
 from mazebench.tasks.perturbations.turned_map import HiddenStart, TurnedMap
 
 LEVELS = (1, 2, 3)
@@ -33,12 +34,10 @@ class Level:
 
     meaning: str  # what is imperfect, in words
     perturbations: tuple[Perturbation, ...] = ()  # in the order in which they apply
-    odometry_noise: float = 0.0  # alpha of `NoisyMotion`, unless the option is given
 
-    @property
-    def strength(self) -> int | None:
-        """The strength of the changes in a building of one's own, see `mazebench.maps.changes`; None without any."""
-        return next((each.strength for each in self.perturbations if isinstance(each, MovedDoors)), None)
+    def of(self, *things: Of) -> tuple[Perturbation, ...]:
+        """Returns the perturbations that are of some things."""
+        return tuple(each for each in self.perturbations if each.of in things)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +60,12 @@ class Track:
     @property
     def pixels_per_cell(self) -> int:
         """Pixels of the shown map per cell of the maze, along each axis."""
-        return max(each.pixels_per_cell for level in self.levels for each in level.perturbations)
+        return max((each.pixels_per_cell for level in self.levels for each in level.perturbations), default=1)
+
+    @property
+    def differs_in_building(self) -> bool:
+        """True if its levels differ in nothing but the building."""
+        return len({level.of(Of.MAP, Of.SENSES) for level in self.levels}) == 1
 
     def require(self, maze: Maze, levels: Sequence[int]) -> None:
         """Raises `InputError` if the track can't be played in `maze`."""
@@ -71,7 +75,7 @@ class Track:
 
 
 TRACKS = {
-    "building": Track(
+    BUILDING: Track(
         "The map is right, but may be turned or mirrored.",
         (
             Level("the map as drawn"),
@@ -82,7 +86,7 @@ TRACKS = {
             Level("and mirrored with probability .5", (TurnedMap(turns=True, mirrors=True), HiddenStart())),
         ),
     ),
-    "rebuilt": Track(
+    REBUILT: Track(
         "Doors have moved since the map was drawn.",
         (
             Level("doors have moved: .45 of the shortest paths on the map are blocked", (MovedDoors(percent=45),)),
@@ -90,39 +94,34 @@ TRACKS = {
             Level("doors have moved: .85 of the paths are blocked", (MovedDoors(percent=85),)),
         ),
     ),
-    "adrift": Track(
+    ADRIFT: Track(
         "Doors have moved since the map was drawn, and the robot only has odometry: its place on the map is unknown.",
         (
             Level(
                 "doors have moved: .7 of the paths are blocked; the start is marked, the heading is unknown",
-                (MovedDoors(percent=70), LostPose()),
-                odometry_noise=0.01,
+                (MovedDoors(percent=70), MotionNoise(0.01), LostPose()),
             ),
             Level(
                 "the same doors; the start is unknown, too: planes 1 and 3 of the context are zero",
-                (MovedDoors(percent=70), LostPose(), HiddenStart()),
-                odometry_noise=0.05,
+                (MovedDoors(percent=70), MotionNoise(0.05), LostPose(), HiddenStart()),
             ),
             Level(
                 "doors have moved: .85 of the paths are blocked; the odometry drifts: its scale is off by up to 10 %, "
                 "its heading walks by 2 degrees per root second",
-                (MovedDoors(percent=85), LostPose(drifts=True), HiddenStart()),
-                odometry_noise=0.2,
+                (MovedDoors(percent=85), MotionNoise(0.2), LostPose(drifts=True), HiddenStart()),
             ),
         ),
     ),
-    "rough": Track(
+    ROUGH: Track(
         "The map is drawn by hand, doors have moved since, and the pose is odometry.",
         (
             Level(
                 "bent by up to 0.5 m, and doors have moved: .45 of the paths are blocked; the start is marked",
-                (MovedDoors(percent=45), HandDrawnMap(bend=0.5), LostPose()),
-                odometry_noise=0.01,
+                (MovedDoors(percent=45), HandDrawnMap(bend=0.5), MotionNoise(0.01), LostPose()),
             ),
             Level(
                 "bent by up to 1 m, .7 of the paths are blocked; the start is unknown, too",
-                (MovedDoors(percent=70), HandDrawnMap(bend=1.0), LostPose(), HiddenStart()),
-                odometry_noise=0.05,
+                (MovedDoors(percent=70), HandDrawnMap(bend=1.0), MotionNoise(0.05), LostPose(), HiddenStart()),
             ),
             Level(
                 "bent by up to 1.5 m, .7 of the paths are blocked; mirrored with probability .5, and the odometry "
@@ -131,10 +130,10 @@ TRACKS = {
                     MovedDoors(percent=70),
                     HandDrawnMap(bend=1.5),
                     TurnedMap(mirrors=True),
+                    MotionNoise(0.2),
                     LostPose(drifts=True),
                     HiddenStart(),
                 ),
-                odometry_noise=0.2,
             ),
         ),
     ),

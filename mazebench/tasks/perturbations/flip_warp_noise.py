@@ -13,7 +13,7 @@ from annotated_types import Interval
 
 from mazebench.maps.maze import Cell
 from mazebench.options import Doc
-from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap, StateError
+from mazebench.tasks.perturbations.perturbation import Drawing, Of, Perturbation, ShownMap, StateError
 from mazebench.tasks.streams import Stream
 
 # If every corner moves by less than this share of the side, the four corners stay a convex quadrilateral.
@@ -43,7 +43,7 @@ class MapFlip(Perturbation):
 
     stream = Stream.MAP_FLIP
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         flipped = rng.random(shown.walls.shape) < self.probability
         flipped[[0, -1]] = flipped[:, [0, -1]] = False
         for cell in ends:
@@ -59,7 +59,7 @@ class MapWarp(Perturbation):
 
     stream = Stream.MAP_WARP
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         return dataclasses.replace(shown, drawing=Perspective(random_homography(len(shown.walls), self.share, rng)))
 
 
@@ -110,9 +110,10 @@ class PositionNoise(Perturbation):
 
     deviation: float  # m, the standard deviation in x and in y
 
+    of = Of.SENSES
     stream = Stream.POSITION_NOISE
 
-    def state_error(self, rng: np.random.Generator) -> StateError:
+    def observed(self, rng: np.random.Generator) -> StateError:
         return functools.partial(_add_noise, self.deviation, rng)
 
 

@@ -42,7 +42,7 @@ class HandDrawnMap(Perturbation):
     stream = Stream.DRAWN_SHEET
     pixels_per_cell = PIXELS
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         size, cell_size = len(shown.walls), shown.cell_size
         displacement = draw_displacement(size, rng, cell_size).scaled(self.bend)
         stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)

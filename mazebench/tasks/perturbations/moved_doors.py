@@ -10,7 +10,7 @@ from mazebench.errors import InputError
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import num_swappable, swap_doors
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
+from mazebench.tasks.perturbations.perturbation import Of, Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
 # How many doors of a maze of 31 x 31 cells move, by kind, so that so many per cent of the shortest paths on the map are
@@ -28,16 +28,15 @@ _STRENGTHS = {45: 1, 70: 2, 85: 3}  # by per cent, see `mazebench.maps.changes`
 
 @dataclasses.dataclass(frozen=True)
 class MovedDoors(Perturbation):
-    """Shows an earlier state of the building: some doors are closed that are open in the world, and as many open."""
+    """Doors that have moved since the map was drawn: some are closed that were open, and as many are open.
+
+    A maze of a user's own is the plan. Its building is a changed one, of the strength that stands for these doors.
+    """
 
     percent: int  # of the shortest paths on the map that are blocked
 
+    of = Of.BUILDING
     stream = Stream.MOVED_DOORS
-
-    @property
-    def strength(self) -> int:
-        """The strength of the changes in a building of one's own that stand for these doors."""
-        return _STRENGTHS[self.percent]
 
     def require(self, maze: Maze) -> None:
         if maze.kind not in SWAPS_BY_PERCENT:
@@ -47,9 +46,14 @@ class MovedDoors(Perturbation):
         if movable < needed:
             raise InputError(f"{maze.name}: expected {needed} doors that can move, found {max(0, movable)}")
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         walls = swap_doors(shown.walls, shown.kind, self.num_swaps(shown), ends, rng)
         return dataclasses.replace(shown, walls=walls)
+
+    def building(self, plan: Maze, rng: np.random.Generator) -> Maze:
+        from mazebench.maps.changes import changed  # which needs numba
+
+        return changed(plan, _STRENGTHS[self.percent], rng)
 
     def num_swaps(self, maze: Maze | ShownMap) -> int:
         """Returns how many doors of a maze move; in mazes of other sizes, as many for each cell."""

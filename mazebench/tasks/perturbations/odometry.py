@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, STEP_TIME, YAW, YAW_RATE, X, Y
-from mazebench.tasks.perturbations.perturbation import Perturbation, StateError
+from mazebench.tasks.perturbations.perturbation import Of, Perturbation, StateError
 from mazebench.tasks.streams import Stream
 from mazebench.world.angles import wrap_angle
 
@@ -27,11 +28,29 @@ class LostPose(Perturbation):
 
     drifts: bool = False  # whether the odometry has a wrong scale and a heading that drifts
 
+    of = Of.SENSES
     stream = Stream.LOST_POSE
     hides_pose = True
 
-    def state_error(self, rng: np.random.Generator) -> StateError:
+    def observed(self, rng: np.random.Generator) -> StateError:
         return Odometry(rng, float(rng.uniform(*_SCALES)), _HEADING_WALK) if self.drifts else Odometry(rng)
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionNoise(Perturbation):
+    """Adds noise to the observed motion, so that the observed pose drifts away from the true one."""
+
+    alpha: float  # of `NoisyMotion`
+
+    of = Of.SENSES
+    stream = Stream.MOTION_NOISE
+    option = "odometry_noise"
+
+    def observed(self, rng: np.random.Generator) -> StateError:
+        return NoisyMotion(self.alpha, rng)
+
+    def told(self) -> Mapping[str, float]:
+        return {"odometry_noise": self.alpha}
 
 
 @dataclasses.dataclass

@@ -1,11 +1,12 @@
-"""The map that an agent is shown, and the base class of what may be wrong with it or with the observed states."""
+"""The map that an agent is shown, and the base of perturbations: of that map, of the building, or of the senses."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
+import enum
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -68,24 +69,50 @@ class ShownMap:
         return points if self.drawing is None else self.drawing.points(points, len(self.walls))
 
 
-class Perturbation:
-    """One thing that may be wrong with what the agent is shown; the world stays true.
+class Of(enum.Enum):
+    """The thing that a perturbation is of."""
 
-    A subclass is a frozen dataclass, whose fields say how wrong it is. It overrides `show`, or `state_error`, or both.
-    They get a new generator of `stream`.
+    MAP = enum.auto()  # how it is drawn
+    BUILDING = enum.auto()  # in what it differs from its map; an older map of a user's own tells it instead
+    SENSES = enum.auto()  # the observed states; the option `exact_pose` leaves it out
+
+
+class Perturbation:
+    """One thing in which the map, the building and the observed states differ.
+
+    A subclass is a frozen dataclass, whose fields say how much. It says what it is `of` and overrides one method or
+    several, each of which gets a new generator of random numbers:
+
+    - `shown`: the map that is shown, in a maze that is the true building. Called once an episode.
+    - `building`: the true building, of a maze of a user's own that is its plan. Called when the mazes are read.
+    - `observed`: the error of the observed states. Called once an episode.
     """
 
-    stream: ClassVar[Stream | None] = None  # that no other one draws from; None if nothing is drawn
+    of: ClassVar[Of] = Of.MAP
+    stream: ClassVar[Stream | None] = None  # of an episode, that no other one draws from; None if nothing is drawn
+    option: ClassVar[str | None] = None  # of the task, whose value stands in the place of a track's
     hides_pose: ClassVar[bool] = False  # whether the observed pose does not tell where the body is
     pixels_per_cell: ClassVar[int] = 1  # of the shown map, along each axis
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         """Returns the map that the agent is shown instead of `shown`; `ends` are the episode's start and goals."""
         return shown
 
-    def require(self, maze: Maze) -> None:
-        """Raises `InputError` if it can't be shown in `maze`."""
+    def building(self, plan: Maze, rng: np.random.Generator) -> Maze:
+        """Returns a true building of which `plan` is the map, with its cells and their size.
 
-    def state_error(self, rng: np.random.Generator) -> StateError | None:
+        Raises:
+          InputError: if the plan can't be changed so.
+        """
+        return plan
+
+    def observed(self, rng: np.random.Generator) -> StateError | None:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""
         return None
+
+    def require(self, maze: Maze) -> None:
+        """Raises `InputError` if it can't be shown in `maze`, which is the true building."""
+
+    def told(self) -> Mapping[str, float]:
+        """Returns what agents may know of it: values of fields of `Interface`, of several levels the largest."""
+        return {}

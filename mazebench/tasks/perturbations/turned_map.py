@@ -22,7 +22,7 @@ class TurnedMap(Perturbation):
 
     stream = Stream.TURNED_SHEET
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         quarters, is_mirrored = int(rng.integers(4)), bool(rng.integers(2))
         side = len(shown.walls) * (1 if shown.drawing is None else shown.drawing.pixels_per_cell)
         turned = _TurnedDrawing(shown.drawing, side, quarters * self.turns, is_mirrored and self.mirrors)
@@ -70,5 +70,5 @@ class _TurnedDrawing(Drawing):
 class HiddenStart(Perturbation):
     """Gives neither the marker of the start nor the map around it: planes 1 and 3 of the context are zero."""
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+    def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         return dataclasses.replace(shown, hidden=(LOCAL_MAP, START))
