@@ -23,7 +23,6 @@ import numpy as np
 from safetensors.numpy import load_file
 
 import mazebench
-from mazebench.constants import ADRIFT, BUILDING, REBUILT, ROUGH
 from mazebench.maps.benchmark import (
     ALL_SPLITS,
     FROZEN_SPLITS,
@@ -35,6 +34,7 @@ from mazebench.maps.benchmark import (
     load_kind_mazes,
     load_mazes,
 )
+from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT, ROUGH
 from mazebench.tasks.trials import benchmark_task_sizes, frozen_trials
 
 PAPER_AGENTS = ("planner", "planner-closed-loop", "oracle", "random", "mah", "dqn", "mmn", "navigator")

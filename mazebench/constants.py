@@ -1,10 +1,7 @@
 """Numbers that many modules need.
 
-This module imports nothing: `import mazebench` registers environments by sizes and tracks, and must load no library.
+This module imports nothing: `import mazebench` registers an environment for each size and must load no library.
 """
-
-# The tracks, as `mazebench.tasks.tracks` describes them.
-TRACK_NAMES = BUILDING, REBUILT, ADRIFT, ROUGH = "building", "rebuilt", "adrift", "rough"
 
 BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of the mazes of the paper's protocol
 

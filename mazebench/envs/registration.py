@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, RENDERING, TASK_VERSION, TRACK_NAMES
+from mazebench.constants import BENCHMARK_SIZES, RENDERING, TASK_VERSION
 from mazebench.errors import InputError
+from mazebench.tasks.streams import TRACK_NAMES
 from mazebench.world.backend import load_mujoco, loading_backend
 
 if TYPE_CHECKING:

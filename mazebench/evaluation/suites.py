@@ -23,6 +23,7 @@ from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
 from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
+from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.looks import VARIED
@@ -54,7 +55,7 @@ def _in_words(split: str = "eval") -> tuple[Part, ...]:
     """Returns parts with an episode in each maze, for agents whose answers cost; their names differ from all others."""
     return tuple(
         Part(f"{track}-{level}-words", TaskOptions(task=track, level=(level,), split=split), episodes_per_maze=1)
-        for track, level in (("building", 1), ("rebuilt", 2), ("adrift", 1), ("adrift", 2))
+        for track, level in ((BUILDING, 1), (REBUILT, 2), (ADRIFT, 1), (ADRIFT, 2))
     )
 
 
@@ -95,8 +96,8 @@ SUITES: dict[str, tuple[Part, ...]] = {
     "tracks-no-goal": _each_level(hide=("map", "goal")),
     "tracks-true-pose": _each_level((name for name, track in TRACKS.items() if track.hides_pose), exact_pose=True),
     # Goals in a row on one wrong map; parts have names of their own, since their first goals are played on the tracks.
-    "tracks-goals": _each_level(("rebuilt",), "-goals", num_goals=3),
-    "tracks-goals-dev": _each_level(("rebuilt",), "-goals", num_goals=3, split=DEV),
+    "tracks-goals": _each_level((REBUILT,), "-goals", num_goals=3),
+    "tracks-goals-dev": _each_level((REBUILT,), "-goals", num_goals=3, split=DEV),
     "llm": _in_words(),
     "llm-dev": _in_words(split=DEV),
 }

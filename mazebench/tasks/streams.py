@@ -1,15 +1,21 @@
-"""The random streams of an episode, by which one thing that is drawn does not change another one."""
+"""What is frozen with the benchmark by name or number: the tracks, and the random streams of an episode.
+
+This module imports no library, for `import mazebench` registers an environment for each track.
+"""
 
 from __future__ import annotations
 
 import enum
 
+# The tracks, which `mazebench.tasks.tracks` describes.
+TRACK_NAMES = BUILDING, REBUILT, ADRIFT, ROUGH = "building", "rebuilt", "adrift", "rough"
+
 
 @enum.unique
 class Stream(enum.IntEnum):
-    """The numbers of the streams, whose values are frozen with the benchmark; a new one takes 16, 17, ...
+    """The streams, by which one thing that is drawn does not change another one.
 
-    5, 7, 8 and 12 stay unused.
+    Their numbers are frozen with the benchmark; a new one takes 16, 17, ... 5, 7, 8 and 12 stay unused.
     """
 
     MAP_FLIP = 0

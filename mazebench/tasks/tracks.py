@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from mazebench.constants import ADRIFT, BUILDING, REBUILT, ROUGH
 from mazebench.maps.maze import Maze
 from mazebench.tasks.perturbations.hand_drawing import HandDrawnMap
 from mazebench.tasks.perturbations.moved_doors import MovedDoors
 from mazebench.tasks.perturbations.odometry import LostPose, MotionNoise
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
 from mazebench.tasks.perturbations.turned_map import HiddenStart, TurnedMap
+from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT, ROUGH
 
 LEVELS = (1, 2, 3)
 DISTANCES = tuple(range(15, 41))  # m between start and goal
