@@ -28,6 +28,7 @@ from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.perturbations.turned_map import TurnedMap
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
+from mazebench.tasks.streams import TRACK_NAMES
 from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -36,6 +37,10 @@ from mazebench.world.ray_casting import TURTLEBOT3
 from tests.simple_mazes import field
 
 PLAYED = [(name, level) for name in TRACKS for level in LEVELS]
+
+
+def test_each_track_that_is_named_is_there():
+    assert tuple(TRACKS) == TRACK_NAMES
 
 
 def episodes(spec: Task, count: int = 20) -> list[Episode]:
