@@ -28,6 +28,7 @@ from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_i
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
 from mazebench.tasks.perturbations import OF_OPTION
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
+from mazebench.tasks.perturbations.odometry import OdometryNoise
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, LIDAR, NOISE_OF_SENSORS, SENSORS, AllSensorOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.looks import PICTURES
@@ -190,14 +191,7 @@ class TaskOptions(AllSensorOptions, ReadOptions):
     map_flip: FlipShare = 0.0
     map_warp: WarpShare = 0.0
     position_noise: PositionDeviation = 0.0
-    odometry_noise: Annotated[
-        float | None,
-        Interval(ge=0, le=1),
-        Doc(
-            "alpha of the noise on the observed motion, AMCL's omnidirectional model (.2 is its default): the observed "
-            "pose drifts away from the true one; that of the track, or 0, if not given."
-        ),
-    ] = None
+    odometry_noise: OdometryNoise = None
     exact_pose: Annotated[
         bool, Doc("On a track whose pose is odometry, observes the true pose instead, as a reference.")
     ] = False

@@ -5,10 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 
 from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, STEP_TIME, YAW, YAW_RATE, X, Y
+from mazebench.options import Doc
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation, StateError
 from mazebench.tasks.streams import Stream
 from mazebench.world.angles import wrap_angle
@@ -20,6 +23,16 @@ _VELOCITY = slice(6, 9)
 _SEGMENT, _SEGMENT_TURN = 0.25, 0.2  # m, rad
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
+
+# The option that is alpha of `NoisyMotion`.
+OdometryNoise = Annotated[
+    float | None,
+    Interval(ge=0, le=1),
+    Doc(
+        "alpha of the noise on the observed motion, AMCL's omnidirectional model (.2 is its default): the observed "
+        "pose drifts away from the true one; that of the track, or 0, if not given."
+    ),
+]
 
 
 @dataclasses.dataclass(frozen=True)
