@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mazebench.agent import Interface
-from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress, run_plan
@@ -38,8 +37,8 @@ class Part:
 
     name: str
     task: TaskOptions
-    episodes_per_distance: int = EPISODES_PER_DISTANCE
-    episodes_per_maze: int = FROZEN_PER_MAZE
+    episodes_per_distance: int | None = None  # as in `EvalOptions`, likewise the other one
+    episodes_per_maze: int | None = None
 
 
 def _hierarchical(name: str, **options: Any) -> Part:
