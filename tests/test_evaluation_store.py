@@ -25,7 +25,7 @@ from mazebench.evaluation.store import Store
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
 
-NAMES = strategies.sampled_from(["number", "trajectory", "leg", "success"]) | strategies.text(max_size=3)
+NAMES = strategies.sampled_from(["result", "trajectory", "number", "success"]) | strategies.text(max_size=3)
 JSON = strategies.none() | strategies.booleans() | strategies.integers() | strategies.floats(-1, 1) | strategies.text()
 
 
@@ -117,22 +117,24 @@ def test_of_two_processes_that_begin_a_run_the_second_is_refused(plan, episodes,
 
 
 def edited(line: str, key: str, value: Any) -> str:
-    """A line of the journal with another value."""
-    return json.dumps(json.loads(line) | {key: value})
+    """A line of the journal with another trajectory, or another value of the result."""
+    content = json.loads(line)
+    (content if key == "trajectory" else content["result"])[key] = value
+    return json.dumps(content)
 
 
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
         (lambda line: "5", "expected another line 2, found "),
-        (lambda line: "{}", "expected another line 2, found number: Field required"),
+        (lambda line: "{}", "expected another line 2, found result: Field required"),
         (lambda line: edited(line, "trajectory", [[[1.0]], None]), "expected another line 2, found trajectory"),
         (lambda line: edited(line, "trajectory", [[[1, 2, 3]], None]), "found a trajectory of another length"),
         (lambda line: edited(line, "trajectory", [None, None]), "expected another line 2, found trajectory"),
         (lambda line: edited(line, "trajectory", [[[1, 2, 1e999]], None]), "expected another line 2, found trajectory"),
-        (lambda line: edited(line, "level", 2), "expected another line 2, found level"),
-        (lambda line: edited(line, "steps", -1), "expected another line 2, found steps"),
-        (lambda line: edited(line, "path_length", 1e999), "expected another line 2, found path_length"),
+        (lambda line: edited(line, "level", 2), "expected another line 2, found result.level"),
+        (lambda line: edited(line, "steps", -1), "expected another line 2, found result.steps"),
+        (lambda line: edited(line, "path_length", 1e999), "expected another line 2, found result.path_length"),
         (lambda line: edited(line, "number", 99), "found one of 99, leg 1"),
         (lambda line: edited(line, "leg", 2), "found one of 0, leg 2"),
     ],

@@ -21,7 +21,7 @@ from mazebench.evaluation.plan import Plan, build_agent
 from mazebench.evaluation.reports import Hit, hit, recalls
 from mazebench.maps.maze import Cell
 from mazebench.results.metrics import spl
-from mazebench.results.records import Record
+from mazebench.results.records import Count, Length, Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.rollout import agent_seed, rollout
 from mazebench.tasks.episode import Episode
@@ -38,14 +38,14 @@ Keep = Callable[[Observation, dict[str, Any], np.ndarray | None], Sequence[Any]]
 class Result(NamedTuple):
     """The result of an episode, or of one leg of an episode with several goals."""
 
-    number: int  # of the trial
+    number: Count  # of the trial
     success: bool
-    steps: int
-    path_length: float  # m
+    steps: Count
+    path_length: Length  # m
     blocked: bool  # whether a wall stands in the shortest path on the shown map
     kept: Sequence[Any] | np.ndarray  # of each moment, the last one included; empty if nothing is kept
     reported: Mapping[str, Any] = {}  # further keys of the record, of what the agent reported
-    leg: int = 1  # of the episode's goals, counted from 1
+    leg: Count = 1  # of the episode's goals, counted from 1
     after_miss: Cell | None = None  # where the leg began if the goal before was missed
 
 
@@ -71,7 +71,7 @@ class _Slot:
     hits: list[Hit | None] = dataclasses.field(default_factory=list)  # of its steps
     legs: list[Result] = dataclasses.field(default_factory=list)  # that have ended
 
-    def end_leg(self, final: dict[str, Any], blocked: bool, notes: Any, size: int) -> None:
+    def end_leg(self, final: dict[str, Any], blocked: bool, notes: Any, task: Task) -> None:
         """Adds the result of the running leg, after which the environment has the infos `final`."""
         has_missed = bool(self.legs) and not self.legs[-1].success
         driven = final["path_length"].item()
@@ -85,7 +85,7 @@ class _Slot:
                 kept=self.kept,
                 reported=recalls(self.hits) | ({} if notes is None else {"notes": notes}),
                 leg=len(self.legs) + 1,
-                after_miss=divmod(self.start, size) if has_missed else None,
+                after_miss=divmod(self.start, task.size) if has_missed else None,
             )
         )
         self.kept, self.hits, self.begun = [], [], driven
@@ -181,7 +181,7 @@ def run_trials(
                 if keep:
                     slot.kept.extend(keep({name: value[None] for name, value in observation.items()}, final, None))
                 notes = None if report.notes is None else report.notes[index]
-                slot.end_leg(final, step.info["blocked"].item(index), notes, task.size)
+                slot.end_leg(final, step.info["blocked"].item(index), notes, task)
                 slot.start = rules.start.item(index)
                 if step.ended[index]:
                     results += slot.legs

@@ -21,7 +21,7 @@ from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Result, to_record, to_trajectory
 from mazebench.evaluation.plan import Plan
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
-from mazebench.results.records import Count, Length, Record, Summary
+from mazebench.results.records import Record, Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
@@ -52,18 +52,11 @@ _Pose = tuple[pydantic.FiniteFloat, pydantic.FiniteFloat, pydantic.FiniteFloat]
 
 
 class _Line(pydantic.BaseModel):
-    """A line of the journal: a `Result`, and the trajectory that was kept."""
+    """A line of the journal."""
 
-    model_config = pydantic.ConfigDict(strict=True, extra="forbid")
+    model_config = pydantic.ConfigDict(strict=True, extra="forbid", arbitrary_types_allowed=True)
 
-    number: Count
-    success: bool
-    steps: Count
-    path_length: Length
-    blocked: bool
-    reported: dict[str, Any]
-    leg: Count
-    after_miss: tuple[Count, Count] | None
+    result: Result  # without what was kept
     # As `Trajectory`; empty if none is kept.
     trajectory: tuple[()] | tuple[list[_Pose], list[_Pose] | None]
 
@@ -130,13 +123,12 @@ class Store:
         Raises:
           InputError: if it is of no episode of the plan.
         """
-        where = f"{self.folder / JOURNAL}: expected results of the run's episodes"
-        if line.number >= len(self._plan.trials) or not 1 <= line.leg <= self._num_legs:
-            raise InputError(f"{where}, found one of {line.number}, leg {line.leg}")
+        result, where = line.result, f"{self.folder / JOURNAL}: expected results of the run's episodes"
+        if result.number >= len(self._plan.trials) or not 1 <= result.leg <= self._num_legs:
+            raise InputError(f"{where}, found one of {result.number}, leg {result.leg}")
         poses = [None if each is None else np.array(each, dtype=np.float32) for each in line.trajectory]
-        if not all(each is None or len(each) == line.steps + 1 for each in poses):
-            raise InputError(f"{where}, found a trajectory of another length of episode {line.number}")
-        result = Result(kept=(), **line.model_dump(exclude={"trajectory"}))
+        if not all(each is None or len(each) == result.steps + 1 for each in poses):
+            raise InputError(f"{where}, found a trajectory of another length of episode {result.number}")
         trajectory = Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
         return to_record(self._plan, result), trajectory
 
@@ -153,8 +145,7 @@ class Store:
             for result in results:
                 _, trajectory = ended[result.number, result.leg]
                 poses = [None if each is None else each.tolist() for each in trajectory or ()]
-                measured = {name: value for name, value in result._asdict().items() if name != "kept"}
-                self._journal.write(to_line(measured | {"trajectory": poses}))
+                self._journal.write(to_line({"result": result._replace(kept=())._asdict(), "trajectory": poses}))
             self._journal.flush()
         self._ended |= ended
 
