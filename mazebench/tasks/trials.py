@@ -6,7 +6,7 @@ import csv
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import overload
+from typing import Any
 
 import numpy as np
 
@@ -92,13 +92,9 @@ class _FrozenTrials(Sequence[Trial]):
     def __len__(self) -> int:
         return len(self._rows)
 
-    @overload
-    def __getitem__(self, index: int) -> Trial: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Trial]: ...
-    def __getitem__(self, index: int | slice) -> Trial | list[Trial]:
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return [self[each] for each in range(*index.indices(len(self)))]
+            return [self[each] for each in range(len(self))[index]]
         if index not in self._parsed:
             self._parsed[index] = _parse(self._rows[index])
         return self._parsed[index]
