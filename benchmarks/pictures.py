@@ -197,9 +197,10 @@ class Played(NamedTuple):
 
 def play(maze: Maze | None, agent: str = "oracle", **options: Any) -> Played:
     """Returns an agent's first episode in a maze; without one, the first whose shortest path on the map is blocked."""
+    one = {} if options.get("task") == "hierarchical" else {"episodes_per_distance": 1}
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        mazebench.evaluate(agent, out=folder, record=True, **{"episodes_per_distance": 1} | options)
+        mazebench.evaluate(agent, out=folder, record=True, **one | options)
         result, trajectories = load_result(folder), load_trajectories(folder / TRAJECTORIES)
     record = next(each for each in result.records if (each.blocked if maze is None else each.maze == maze.name))
     task, trajectory = resolve(result.summary.task), trajectories[record.episode]

@@ -17,17 +17,18 @@ from mazebench.evaluation.evaluate import evaluate
 from mazebench.results.metrics import summarize
 from mazebench.results.reading import load_result
 
+ONE = {"episodes_per_distance": 1}
 # Agents that draw, plan, correct themselves and ask a network, under every perturbation.
 SETTINGS: dict[str, dict[str, Any]] = {
-    "random": {"agent": "random", "distances": (2, 6)},
-    "planner": {"agent": "planner", "distances": (4,), "map_flip": 0.2, "map_warp": 0.2},
+    "random": {"agent": "random", "distances": (2, 6), **ONE},
+    "planner": {"agent": "planner", "distances": (4,), "map_flip": 0.2, "map_warp": 0.2, **ONE},
     "hierarchical": {
         "agent": "planner-closed-loop",
         "task": "hierarchical",
         "map_flip": 0.1,
         "position_noise": 0.3,
     },
-    "mah-noise": {"agent": "mah", "distances": (2,), "map_flip": 0.1, "position_noise": 0.3},
+    "mah-noise": {"agent": "mah", "distances": (2,), "map_flip": 0.1, "position_noise": 0.3, **ONE},
 }
 TRAIN = "train --agent mah --env-steps 200 --checkpoint-steps 200 --eval-mazes 1 --set channels=4 --set hidden=16"
 TRAIN += " --set groups=4 --set steps=4 --set num_envs=8 --set min_rows=100 --set steps_per_update=32"
@@ -69,7 +70,7 @@ SURROUNDINGS: dict[str, dict[str, str]] = {
 
 def run(name: str, folder: pathlib.Path, **running: Any) -> dict[str, bytes]:
     """Evaluates a setting and returns the files that must not depend on how it is run."""
-    evaluate(out=folder, record=True, **{"episodes_per_distance": 1} | SETTINGS[name], **running)
+    evaluate(out=folder, record=True, **SETTINGS[name], **running)
     return results_of(folder)
 
 

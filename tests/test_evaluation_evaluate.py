@@ -308,6 +308,32 @@ class TestRefused:
         assert "\n" not in str(refused.value)
         assert list(tmp_path.iterdir()) == []
 
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            (
+                {"task": "rebuilt", "episodes_per_distance": 1},
+                "expected episodes_per_maze for a track's frozen episodes, found episodes_per_distance 1",
+            ),
+            (
+                {"episodes_per_maze": 1},
+                "expected episodes_per_distance except for a track's frozen episodes, found episodes_per_maze 1",
+            ),
+            (
+                {"task": "building", "kinds": "house", "num_mazes": 1, "episodes_per_maze": 5},
+                "expected episodes_per_distance except for a track's frozen episodes, found episodes_per_maze 5",
+            ),
+            (
+                {"task": "hierarchical", "episodes_per_distance": 2},
+                "expected one episode in each maze of the hierarchical task, found episodes_per_distance 2",
+            ),
+        ],
+    )
+    def test_a_number_of_episodes_that_would_be_ignored_is_refused(self, tmp_path, options, message):
+        with pytest.raises(InputError, match=f"^{message}$"):
+            evaluate("random", out=tmp_path / "out", **options)
+        assert list(tmp_path.iterdir()) == []
+
     def test_an_agent_that_cannot_play_leaves_no_folder(self, tmp_path):
         with pytest.raises(UnplayableError, match="its checkpoint reads maps of 13 x 13 only, found 15 x 15"):
             evaluate("mmn", out=tmp_path / "out", size=15, **FEW)

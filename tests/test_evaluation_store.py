@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import json
 import pathlib
 import resource
@@ -26,7 +25,7 @@ from mazebench.evaluation.store import Store
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
 
-NAMES = strategies.sampled_from(["record", "trajectory", "episode", "agent"]) | strategies.text(max_size=3)
+NAMES = strategies.sampled_from(["result", "trajectory", "number", "success"]) | strategies.text(max_size=3)
 JSON = strategies.none() | strategies.booleans() | strategies.integers() | strategies.floats(-1, 1) | strategies.text()
 
 
@@ -38,9 +37,8 @@ def plan() -> Plan:
 @pytest.fixture(scope="module")
 def episodes(plan) -> list[Result]:
     """The results of all episodes of the plan, in its order."""
-    trials = dict(enumerate(plan.trials))
-    chunk = Chunk(plan.options, plan.task, plan.agent_class, trials, record=True, num_envs=40, num_threads=0)
-    return sorted(result for results in run_chunk(chunk) for result in results)
+    chunk = Chunk(range(len(plan.trials)), num_envs=40, num_threads=0, record=True)
+    return sorted(result for results in run_chunk(plan, chunk) for result in results)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +89,7 @@ def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary
 def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summary, unbroken, tmp_path, record):
     ended = [each if record else each._replace(kept=()) for each in episodes]
     said = r"can't write there: File too large; what was written is kept, go on with --resume$"
-    with Store(tmp_path, plan, resume=False, record=record) as store, files_of_at_most(12000):
+    with Store(tmp_path, plan, resume=False, record=record) as store, files_of_at_most(12000 if record else 4000):
         for each in ended[:3]:
             store.append([each])
         with pytest.raises(RunError, match=said):
@@ -118,11 +116,10 @@ def test_of_two_processes_that_begin_a_run_the_second_is_refused(plan, episodes,
         first.append(episodes[:1])
 
 
-def edited(line: str, path: str, value: Any) -> str:
-    """A line of the journal with another value at a path of keys."""
+def edited(line: str, key: str, value: Any) -> str:
+    """A line of the journal with another trajectory, or another value of the result."""
     content = json.loads(line)
-    *keys, last = path.split(".")
-    functools.reduce(lambda inner, key: inner[key], keys, content)[last] = value
+    (content if key == "trajectory" else content["result"])[key] = value
     return json.dumps(content)
 
 
@@ -130,21 +127,19 @@ def edited(line: str, path: str, value: Any) -> str:
     ("edit", "message"),
     [
         (lambda line: "5", "expected another line 2, found "),
-        (lambda line: "{}", "expected another line 2, found record: Field required"),
+        (lambda line: "{}", "expected another line 2, found result: Field required"),
         (lambda line: edited(line, "trajectory", [[[1.0]], None]), "expected another line 2, found trajectory"),
         (lambda line: edited(line, "trajectory", [[[1, 2, 3]], None]), "found a trajectory of another length"),
         (lambda line: edited(line, "trajectory", [None, None]), "expected another line 2, found trajectory"),
         (lambda line: edited(line, "trajectory", [[[1, 2, 1e999]], None]), "expected another line 2, found trajectory"),
-        (lambda line: edited(line, "record.level", 2), "found '2' as level of episode 0"),
-        (lambda line: edited(line, "record.agent", "other"), "found 'other' as agent of episode 0"),
-        (lambda line: edited(line, "record.maze", "other"), "found 'other' as maze of episode 0"),
-        (lambda line: edited(line, "record.episode", 1), "as (maze|start|goal|seed|distance) of episode 1"),
-        (lambda line: edited(line, "record.episode", 99), "found one of 99"),
-        (lambda line: edited(line, "record.seed", 5), "found '5' as seed of episode 0"),
-        (lambda line: edited(line, "record.spl", 0.5), "found '0.5' as spl of episode 0"),
+        (lambda line: edited(line, "level", 2), "expected another line 2, found result.level"),
+        (lambda line: edited(line, "steps", -1), "expected another line 2, found result.steps"),
+        (lambda line: edited(line, "path_length", 1e999), "expected another line 2, found result.path_length"),
+        (lambda line: edited(line, "number", 99), "found one of 99, leg 1"),
+        (lambda line: edited(line, "leg", 2), "found one of 0, leg 2"),
     ],
 )
-def test_a_record_of_another_run_is_refused(plan, episodes, tmp_path, edit, message):
+def test_a_line_that_is_no_result_of_the_run_is_refused(plan, episodes, tmp_path, edit, message):
     with Store(tmp_path, plan, resume=False, record=True) as store:
         store.append(episodes[:1])
     journal = tmp_path / "journal.jsonl"

@@ -18,7 +18,7 @@ from mazebench.report.episodes import join_episodes, reported
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.results.intervals import Estimate, runs_interval
-from mazebench.results.metrics import ON_TIME_METRICS, scores
+from mazebench.results.metrics import ON_TIMES, scores
 from mazebench.results.naming import order
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_result
 from mazebench.storage.files import make_folder, open_whole
@@ -27,7 +27,7 @@ from mazebench.training.run_folder import METRICS, checkpoints, read_metrics
 
 PAPER = "paper"  # the suite
 LOCAL = "local-13"  # the part of `paper` on which training runs are evaluated
-ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
+ON_TIME_125, ON_TIME_2 = (metric.name for metric in ON_TIMES)  # within 1.25 and 2 times the oracle's steps
 WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest rates, after JaxNav; else missing
 # The archive of evaluations whose records have the recall of poses, in folders AGENT/TRACK-LEVEL.
 RECALL = "recall"

@@ -31,9 +31,9 @@ from benchmarks.results.kept import (
 )
 from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
-from mazebench.report.table import METRICS, to_markdown
+from mazebench.report.table import to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
-from mazebench.results.records import RECALLS
+from mazebench.results.metrics import METRICS, ON_TIMES, RECALLS, SPL, SUCCESS_RATE
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
@@ -243,11 +243,13 @@ def tracks_learned(agent: str, kept: Kept) -> str:
 def tracks_map_worth(kept: Kept) -> str:
     """Returns the navigator's headline numbers with their intervals, and what the map is worth to it."""
     rows = []
-    metrics = {"success_rate": "success", ON_TIME_2: METRICS[ON_TIME_2], ON_TIME_125: METRICS[ON_TIME_125]}
+    metrics = {"success_rate": "success", ON_TIME_2: METRICS[ON_TIME_2].title, ON_TIME_125: METRICS[ON_TIME_125].title}
     for track, level, own in kept.on_tracks("navigator"):
         both = own, kept.of("navigator without map", f"{track}-{level}")
         rows.append([f"`{track}` {level}", *(_interval(metric, own) for metric in metrics), *_compared(both)[1:]])
-    return format_table(["setting", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
+    return format_table(
+        ["setting", *metrics.values(), f"without the map, {METRICS[ON_TIME_125].title}", "map worth"], rows
+    )
 
 
 def tracks_learned_worth(kept: Kept) -> str:
@@ -309,7 +311,7 @@ def tracks_memory(kept: Kept) -> str:
         episodes = set.intersection(*(set(own.episode) for own in legs))
         cells = _compared([own[own.episode.isin(episodes)] for own in legs])
         rows.append([f"`rebuilt` {level}", str(goal), str(len(episodes)), *cells])
-    header = ["setting", "goal", "legs", f"in a row, {METRICS[ON_TIME_125]}", "without memory", "memory worth"]
+    header = ["setting", "goal", "legs", f"in a row, {METRICS[ON_TIME_125].title}", "without memory", "memory worth"]
     return format_table(header, rows)
 
 
@@ -322,7 +324,7 @@ def tracks_blocked(kept: Kept) -> str:
             cells = [(str(len(each)), _interval(ON_TIME_125, each)) for each in groups]
             rows.append([f"`{track}` {level}", *cells[0], *cells[1]])
     open_path, blocked = (f"episodes, path on the map {name}" for name in ("open", "blocked"))
-    return format_table(["setting", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
+    return format_table(["setting", open_path, METRICS[ON_TIME_125].title, blocked, METRICS[ON_TIME_125].title], rows)
 
 
 def expected_on_track(track: str, kept: Kept) -> str:
@@ -341,7 +343,7 @@ def expected_hierarchical(kept: Kept) -> str:
     rows = [
         [text, *(_interval(metric, own) for metric in ("success_rate", ON_TIME_125))] for text, own in agents.items()
     ]
-    return format_table(["agent", "success", METRICS[ON_TIME_125]], rows)
+    return format_table(["agent", "success", METRICS[ON_TIME_125].title], rows)
 
 
 def tracks_recall(kept: Kept) -> str:
@@ -349,8 +351,8 @@ def tracks_recall(kept: Kept) -> str:
     rows = []
     for agent, (track, level) in itertools.product(RECALL_AGENTS, RECALL_SETTINGS):
         own = kept.of(agent, f"{track}-{level}-{RECALL}")
-        rows.append([f"`{agent}`", f"`{track}` {level}", *(_interval(metric, own) for metric in RECALLS)])
-    return format_table(["agent", "setting", *RECALLS.values()], rows)
+        rows.append([f"`{agent}`", f"`{track}` {level}", *(_interval(metric.name, own) for metric in RECALLS)])
+    return format_table(["agent", "setting", *(metric.title for metric in RECALLS)], rows)
 
 
 # By the name that a page gives.
@@ -397,12 +399,12 @@ TABLES: dict[str, Callable[[Kept], str]] = {
         kept,
     ),
     "tracks-navigator": lambda kept: by_track(
-        {text: ("navigator", metric, _KINDS) for metric, text in METRICS.items() if metric != "spl_grid"}, kept
+        {metric.title: ("navigator", metric.name, _KINDS) for metric in (SUCCESS_RATE, *ON_TIMES, SPL)}, kept
     ),
     "tracks-navigator-kinds": lambda kept: by_track(
         {f"`{kind}`": ("navigator", ON_TIME_125, (kind,)) for kind in _KINDS},
         kept,
-        f"track, {METRICS[ON_TIME_125]}",
+        f"track, {METRICS[ON_TIME_125].title}",
     ),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 from rich import box
@@ -10,18 +11,17 @@ from rich.table import Table
 
 from mazebench.constants import ON_TIME
 from mazebench.results.comparison import Row
-from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.results.metrics import HEADLINE, METRICS, Metric
 from mazebench.results.naming import noise_in_words, title_of
 from mazebench.results.paper import printed_mmn
 from mazebench.results.records import Figures, Summary
 
 _ANY_WIDTH = 10_000  # characters
 _MOST_DISTANCES = 20  # of a table; --distances may name hundreds
-_HEAD = ("n", "success rate", "on time", "SPL", "SPL by grid")
-_RECALL_HEAD = ("pose 1 m", "pose 1 m, 30 deg")  # of agents that report poses
 _RECALL_NOTE = "pose: share of steps whose reported pose is within it, then that of episodes at their end"
 _NOTE = f"on time: within {' and '.join(f'{k:g}' for k in ON_TIME)} times the oracle's steps"
-_ON_TIME, _NAME_OF_ON_TIME = next((metric, f"on time {k:g}") for metric, k in ON_TIME_METRICS.items())
+
+Columns = Sequence[Sequence[Metric]]  # of a table; metrics of one column share its cells
 
 
 def print_summary(summary: Summary) -> None:
@@ -35,19 +35,19 @@ def print_summary(summary: Summary) -> None:
     perturbations = [f"{name} {value}" for name, value in task.perturbations.items() if value]
     perturbed = ", ".join([*perturbations, *noise_in_words(task)])
     paper = printed_mmn(summary)
-    head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
-    if summary.overall.recall:
-        head += _RECALL_HEAD
-    totals = []
+    columns, totals = _columns(summary), []
+    head = ["n", *_heads(columns)]
+    if paper:
+        head.insert(2, "paper")
     if not task.is_hierarchical:
         by_distance = summary.by_distance if len(summary.by_distance) <= _MOST_DISTANCES else {}
         head = ["distance" if by_distance else "episodes", *head]
-        rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in by_distance.items()]
+        rows = [[distance, *_cells(row, columns, paper, int(distance))] for distance, row in by_distance.items()]
         totals = [
-            [name, *_with_paper(row, paper)] for name, row in [*summary.by_fact.items(), ("all", summary.overall)]
+            [name, *_cells(row, columns, paper)] for name, row in [*summary.by_fact.items(), ("all", summary.overall)]
         ]
     else:
-        rows = [_with_paper(summary.overall, paper, task.landmark_distance)]
+        rows = [_cells(summary.overall, columns, paper, task.landmark_distance)]
     print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals)
     _print_notes(summary)
     if paper:
@@ -58,20 +58,19 @@ def print_suite(summaries: Sequence[Summary]) -> None:
     """Prints the overall figures of a suite's parts, one table an agent."""
     for agent in dict.fromkeys(summary.who for summary in summaries):
         own = [summary for summary in summaries if summary.who == agent]
-        head = ("part", *_HEAD, *(_RECALL_HEAD if any(summary.overall.recall for summary in own) else ()))
-        rows = [[str(summary.part), *_cells(summary.overall)] for summary in own]
-        print_table(f"{agent}: suite {summaries[0].suite}", head, [[*row, "", ""][: len(head)] for row in rows])
+        columns = _columns(*own)
+        rows = [[str(summary.part), *_cells(summary.overall, columns)] for summary in own]
+        print_table(f"{agent}: suite {summaries[0].suite}", ["part", "n", *_heads(columns)], rows)
     _print_notes(*summaries)
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
     """Prints what A has more than B, with 95 % intervals; the keys of `rows` go in the column `name`."""
-    metrics = {"success_rate": "success rate", _ON_TIME: _NAME_OF_ON_TIME, "spl": "SPL"}
-    head = (name, "A", "B", *(f"A - B, {metric}" for metric in metrics.values()), "A wins")
+    head = (name, "A", "B", *(f"A - B, {metric.title}" for metric in HEADLINE), "A wins")
     cells = []
     for key, row in rows.items():
-        rates, differences = row.metrics["success_rate"], [row.metrics[metric].difference for metric in metrics]
-        intervals = [f"{each.value:+.2f} [{each.low:+.2f}, {each.high:+.2f}]" for each in differences]
+        rates, *_ = paired = [row.metrics[metric.name] for metric in HEADLINE]
+        intervals = ["{:+.2f} [{:+.2f}, {:+.2f}]".format(*dataclasses.astuple(each.difference)) for each in paired]
         cells.append([key, f"{rates.a:.2f}", f"{rates.b:.2f}", *intervals, f"{row.win_share.value:.2f}"])
     print_table(title, head, cells)
 
@@ -96,23 +95,31 @@ def print_table(
     console.print(table)
 
 
-def _with_paper(row: Figures, paper: Mapping[int, float], distance: int = 0) -> list[str]:
+def _columns(*summaries: Summary) -> Columns:
+    """Returns the columns of which one of the summaries has values."""
+    heads = dict.fromkeys(metric.head for metric in METRICS.values())
+    columns = [[metric for metric in METRICS.values() if metric.head == head] for head in heads]
+    return [each for each in columns if any(_cell(summary.overall, each) for summary in summaries)]
+
+
+def _heads(columns: Columns) -> list[str]:
+    return [metrics[0].head for metrics in columns]
+
+
+def _cells(row: Figures, columns: Columns, paper: Mapping[int, float] | None = None, distance: int = 0) -> list[str]:
     """Cells of a row, with the paper's success rate behind ours if it printed any; no distance of its is 0."""
-    count, success_rate, *others = _cells(row)
-    printed = [f"{paper[distance]:.2f}" if distance in paper else ""] if paper else []
-    return [count, success_rate, *printed, *others]
+    cells = [str(row.n), *(_cell(row, metrics) for metrics in columns)]
+    if paper:
+        cells.insert(2, f"{paper[distance]:.2f}" if distance in paper else "")
+    return cells
 
 
-def _cells(row: Figures) -> list[str]:
-    """Cells of a row below `_HEAD`."""
-    success_rate, spl = (
-        f"{value:.2f} [{low:.2f}, {high:.2f}]"
-        for value, (low, high) in ((row.success_rate, row.success_rate_ci95), (row.spl, row.spl_ci95))
+def _cell(row: Figures, metrics: Sequence[Metric]) -> str:
+    estimates = [(metric, estimate) for metric in metrics if (estimate := metric.estimate(row))]
+    return ", ".join(
+        f"{each.value:.2f}" + (f" [{each.low:.2f}, {each.high:.2f}]" if metric.shows_interval else "")
+        for metric, each in estimates
     )
-    on_time = ", ".join(f"{share:.2f}" for share in row.on_time.values())
-    recalls = [f"{value:.2f}" for value in row.recall.values()]
-    pairs = zip(recalls[:2], recalls[2:], strict=True)  # over episodes, and at their ends
-    return [str(row.n), success_rate, on_time, spl, f"{row.spl_grid:.2f}", *map(", ".join, pairs)]
 
 
 def _print_notes(*summaries: Summary) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import collections
 import contextlib
 import dataclasses
-import functools
 import pathlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -16,19 +15,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mazebench.agent import Agent, Observation
-from mazebench.agent_loading import load_agent_class
 from mazebench.constants import YAW, X, Y
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent
 from mazebench.evaluation.reports import Hit, hit, recalls
 from mazebench.maps.maze import Cell
 from mazebench.results.metrics import spl
-from mazebench.results.records import Record
+from mazebench.results.records import Count, Length, Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.rollout import agent_seed, rollout
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Leg, Trial, shortest_path
 
@@ -40,56 +38,69 @@ Keep = Callable[[Observation, dict[str, Any], np.ndarray | None], Sequence[Any]]
 class Result(NamedTuple):
     """The result of an episode, or of one leg of an episode with several goals."""
 
-    number: int  # of the trial
+    number: Count  # of the trial
     success: bool
-    steps: int
-    path_length: float  # m
+    steps: Count
+    path_length: Length  # m
     blocked: bool  # whether a wall stands in the shortest path on the shown map
     kept: Sequence[Any] | np.ndarray  # of each moment, the last one included; empty if nothing is kept
     reported: Mapping[str, Any] = {}  # further keys of the record, of what the agent reported
-    leg: int = 1  # of the episode's goals, counted from 1
+    leg: Count = 1  # of the episode's goals, counted from 1
     after_miss: Cell | None = None  # where the leg began if the goal before was missed
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Chunk:
-    """Some episodes of an evaluation, for one process to run."""
+class Chunk(NamedTuple):
+    """Some episodes of a plan, for one process to run."""
 
-    options: EvalOptions  # of the plan
-    task: Task  # of the plan
-    agent_class: type[Agent]
-    trials: Mapping[int, Trial]  # by their numbers in the plan
-    record: bool  # whether trajectories are wanted
+    numbers: Sequence[int]  # of the plan's trials
     num_envs: int  # environments side by side
     num_threads: int  # of the simulation; 0 for all cores
+    record: bool  # whether trajectories are wanted
     folder: pathlib.Path | None = None  # of the results
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Leaves out the class, which may have been made of a `SingleAgent`: a worker loads it by its name."""
-        how = self.record, self.num_envs, self.num_threads, self.folder
-        return _unpickled, (self.options, self.task, self.trials, *how)
+
+@dataclasses.dataclass
+class _Slot:
+    """The episode that runs in an environment."""
+
+    number: int  # of the trial
+    shown: ShownMap
+    start: int  # the cell in which the running leg began, as row * N + column
+    begun: float = 0.0  # m driven in the episode when the running leg began
+    kept: list[Any] = dataclasses.field(default_factory=list)  # of the running leg, as `Result` has it
+    hits: list[Hit | None] = dataclasses.field(default_factory=list)  # of its steps
+    legs: list[Result] = dataclasses.field(default_factory=list)  # that have ended
+
+    def end_leg(self, final: dict[str, Any], blocked: bool, notes: Any, task: Task) -> None:
+        """Adds the result of the running leg, after which the environment has the infos `final`."""
+        has_missed = bool(self.legs) and not self.legs[-1].success
+        driven = final["path_length"].item()
+        self.legs.append(
+            Result(
+                number=self.number,
+                success=final["goal_reached"].item(),
+                steps=final["steps"].item() - sum(leg.steps for leg in self.legs),
+                path_length=driven - self.begun,
+                blocked=blocked,
+                kept=self.kept,
+                reported=recalls(self.hits) | ({} if notes is None else {"notes": notes}),
+                leg=len(self.legs) + 1,
+                after_miss=divmod(self.start, task.size) if has_missed else None,
+            )
+        )
+        self.kept, self.hits, self.begun = [], [], driven
 
 
-def _unpickled(options: EvalOptions, task: Task, *others: Any) -> Chunk:
-    return Chunk(options, _shared(task), load_agent_class(options.agent), *others)
-
-
-@functools.lru_cache(maxsize=1)
-def _shared(task: Task) -> Task:
-    """Returns the same object for all chunks of an evaluation that a process runs, so that they share the mazes."""
-    return task
-
-
-def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
+def run_chunk(plan: Plan, chunk: Chunk) -> Iterator[list[Result]]:
     """Yields the results of the episodes that ended, after each step; each once, in no fixed order."""
     for results in run_trials(
-        build_agent(chunk.options, chunk.task, chunk.agent_class, chunk.folder),
-        chunk.task,
-        chunk.trials,
+        build_agent(plan.options, plan.task, plan.agent_class, chunk.folder),
+        plan.task,
+        {number: plan.trials[number] for number in chunk.numbers},
         chunk.num_envs,
         chunk.num_threads,
-        seed=chunk.options.seed,
-        needs_truth=chunk.agent_class.needs_truth,
+        seed=plan.options.seed,
+        needs_truth=plan.agent_class.needs_truth,
         keep=_poses if chunk.record else None,
     ):
         yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
@@ -126,66 +137,56 @@ def run_trials(
     num_envs = min(num_envs, len(trials))
     # The longest ways first, so that no environment is left alone with one at the end.
     queue = collections.deque(sorted(trials, key=lambda number: -trials[number].shortest_path))
-    running = [-1] * num_envs  # the number of the trial in each environment; -1 where none is left
+    numbers = [-1] * num_envs  # of the trial in each environment; -1 where none is left
 
-    def next_episode(slot: int) -> Episode | None:
-        running[slot] = queue.popleft() if queue else -1
-        return None if running[slot] < 0 else trials[running[slot]].episode
+    def next_episode(index: int) -> Episode | None:
+        numbers[index] = queue.popleft() if queue else -1
+        return None if numbers[index] < 0 else trials[numbers[index]].episode
 
-    def seeds(slots: np.ndarray) -> list[int]:
-        return [agent_seed(seed, running[slot]) for slot in slots]
+    def seeds(indices: np.ndarray) -> list[int]:
+        return [agent_seed(seed, numbers[index]) for index in indices]
 
-    kept: list[list[Any]] = [[] for _ in range(num_envs)]  # of the running legs, as `Result` has it
-    hits: list[list[Hit | None]] = [[] for _ in range(num_envs)]  # of their steps
-    legs: list[list[Result]] = [[] for _ in range(num_envs)]  # that have ended, of the running episodes
-    begun = np.zeros(num_envs)  # m driven in the episode when the running leg began
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         rules, first = env.rules, env.reset()
-        before = list(running), list(rules.shown), rules.pose.copy(), rules.start.copy()
+
+        def begin(index: int) -> _Slot | None:
+            shown = rules.shown[index]
+            return (
+                None if numbers[index] < 0 or shown is None else _Slot(numbers[index], shown, rules.start.item(index))
+            )
+
+        slots = [begin(index) for index in range(num_envs)]
         for step in rollout(agent, env, first, seeds, needs_truth=needs_truth):
-            numbers, shown, poses, starts = before
+            poses = np.column_stack([step.info["position"], step.info["yaw"]])
             report = agent.report(step.state)
             moments = keep(step.inputs.observation, step.info, step.actions) if keep else None
-            for slot in [slot for slot, number in enumerate(numbers) if number >= 0]:
-                pose = None if report.pose is None else report.pose[slot]
-                hits[slot].append(hit(shown[slot], poses[slot], pose))  # type: ignore[arg-type]  # a map is shown
-                if moments is not None:
-                    kept[slot].append(moments[slot])
+            for index, slot in enumerate(slots):
+                if slot is not None:
+                    slot.hits.append(hit(slot.shown, poses[index], None if report.pose is None else report.pose[index]))
+                    slot.kept += [] if moments is None else [moments[index]]
 
             results: list[Result] = []
             leg_ended = step.ended | (step.next_info["is_first"] & (task.options.num_goals > 1))
-            for slot in np.flatnonzero(leg_ended).tolist():
+            for index in np.flatnonzero(leg_ended).tolist():
+                slot = slots[index]
+                assert slot is not None
                 # The last moment of the leg, where the next one begins unless the episode has ended.
-                if step.ended[slot]:
-                    observation, infos = step.next_info["final_obs"][slot], step.next_info["final_info"]
+                if step.ended[index]:
+                    observation, infos = step.next_info["final_obs"][index], step.next_info["final_info"]
                 else:
-                    observation = {name: values[slot] for name, values in step.next_observation.items()}
+                    observation = {name: values[index] for name, values in step.next_observation.items()}
                     infos = rules.infos()
-                final = {name: values[slot : slot + 1] for name, values in infos.items()}
+                final = {name: values[index : index + 1] for name, values in infos.items()}
                 if keep:
-                    kept[slot].extend(keep({name: value[None] for name, value in observation.items()}, final, None))
-
-                ended, note = legs[slot], None if report.notes is None else report.notes[slot]
-                has_missed = bool(ended) and not ended[-1].success
-                result = Result(
-                    number=numbers[slot],
-                    success=final["goal_reached"].item(),
-                    steps=final["steps"].item() - sum(leg.steps for leg in ended),
-                    path_length=final["path_length"].item() - begun.item(slot),
-                    blocked=step.info["blocked"].item(slot),
-                    kept=kept[slot],
-                    reported=recalls(hits[slot]) | ({} if note is None else {"notes": note}),
-                    leg=len(ended) + 1,
-                    after_miss=divmod(starts.item(slot), task.size) if has_missed else None,
-                )
-                kept[slot], hits[slot], legs[slot] = [], [], [*ended, result]
-                begun[slot] = 0 if step.ended[slot] else final["path_length"].item()
-                if step.ended[slot]:
-                    results += legs[slot]
-                    legs[slot] = []
+                    slot.kept.extend(keep({name: value[None] for name, value in observation.items()}, final, None))
+                notes = None if report.notes is None else report.notes[index]
+                slot.end_leg(final, step.info["blocked"].item(index), notes, task)
+                slot.start = rules.start.item(index)
+                if step.ended[index]:
+                    results += slot.legs
+                    slots[index] = begin(index)
             yield results
-            before = list(running), list(rules.shown), rules.pose.copy(), rules.start.copy()
 
 
 def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:

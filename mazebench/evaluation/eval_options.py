@@ -30,13 +30,15 @@ class EvalOptions(Options):
         int | None,
         Ge(1),
         Doc(
-            f"Episodes for each maze and distance (local task); {EPISODES_PER_DISTANCE} if not given. The frozen ones "
-            "of a track are all played; in mazes of your own, a track has 48 episodes a maze if not given."
+            f"Episodes for each maze and distance (local task); {EPISODES_PER_DISTANCE} if not given. In mazes of your "
+            "own, a track has 48 episodes a maze if not given. The frozen ones of a track are all played."
         ),
     ] = None
     episodes_per_maze: Annotated[
-        int, Interval(ge=1, le=FROZEN_PER_MAZE), Doc("Of a track's frozen episodes, so many in each maze.")
-    ] = FROZEN_PER_MAZE
+        int | None,
+        Interval(ge=1, le=FROZEN_PER_MAZE),
+        Doc("Of a track's frozen episodes, so many in each maze; all if not given."),
+    ] = None
     checkpoint: Annotated[
         str | None, Doc("A learned agent's checkpoint or run folder; the shipped one if not given.")
     ] = None

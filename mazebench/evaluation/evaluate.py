@@ -16,7 +16,7 @@ from mazebench.evaluation.chunk import Chunk
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions, eval_options
 from mazebench.evaluation.measured_oracle import with_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
-from mazebench.evaluation.pool import Pool, open_pool
+from mazebench.evaluation.pool import Pool
 from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.options import check_names, options_in
 from mazebench.results import metrics
@@ -100,7 +100,7 @@ def run_evaluation(
         remark(
             f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
         )
-    with open_pool(run) as pool, tempfile.TemporaryDirectory() as temporary:
+    with Pool(run.workers) as pool, tempfile.TemporaryDirectory() as temporary:
         return run_plan(plan, out or pathlib.Path(temporary), pool, run, progress)
 
 
@@ -123,7 +123,7 @@ def run_plan(
         return summary
     with Store(folder, plan, resume=run.resume, record=record) as store:
         progress(store.num_ended, num_trials)
-        for results in pool.run(_cut(plan, store, pool, run.num_envs)):
+        for results in pool.run(plan, _cut(store, pool, run.num_envs)):
             if results:
                 store.append(results)
                 progress(store.num_ended, num_trials)
@@ -146,7 +146,7 @@ def run_plan(
     return summary
 
 
-def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:
+def _cut(store: Store, pool: Pool, num_envs: int) -> list[Chunk]:
     """Returns what is left to run as chunks of one size and mixture."""
     missing = store.missing
     num_chunks = min(1, len(missing))
@@ -154,16 +154,8 @@ def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:
         wanted = min(_CHUNKS_PER_WORKER * pool.num_workers, len(missing) // _LEAST_CHUNK)
         num_chunks = min(len(missing), max(pool.num_workers, wanted))
         num_envs = min(num_envs, math.ceil(len(missing) / num_chunks / _EPISODES_PER_ENV))
+    num_threads = 1 if pool.num_workers else 0
     return [
-        Chunk(
-            plan.options,
-            plan.task,
-            plan.agent_class,
-            {index: plan.trials[index] for index in missing[first::num_chunks]},
-            store.record,
-            num_envs,
-            pool.num_threads,
-            store.folder,
-        )
+        Chunk(missing[first::num_chunks], num_envs, num_threads, store.record, store.folder)
         for first in range(num_chunks)
     ]

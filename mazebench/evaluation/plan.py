@@ -15,7 +15,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
 from mazebench.options import override
@@ -24,7 +24,7 @@ from mazebench.tasks.context import default_context_size
 from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task import Task, options_of, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
-from mazebench.tasks.trials import Trial, select_trials
+from mazebench.tasks.trials import Trial, counting_option, select_trials
 from mazebench.world.mjcf import largest_spec
 
 # Of a provenance: what must be the same in all processes of a run, besides the options.
@@ -36,6 +36,12 @@ _IDENTIFYING = (
     "agent_code_sha256",
     "checkpoint_sha256",
 )
+# How many episodes there are, by the name of the option that says it.
+_COUNTING = {
+    "episodes_per_maze": "episodes_per_maze for a track's frozen episodes",
+    "episodes_per_distance": "episodes_per_distance except for a track's frozen episodes",
+    None: "one episode in each maze of the hierarchical task",
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -45,7 +51,7 @@ class Plan:
     options: EvalOptions  # with the very file of the checkpoint
     task: Task  # as the agent plays it: with its actions and sensors, and maps of the size that it asks for
     agent_class: type[Agent]
-    trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
+    trials: Sequence[Trial]  # in the protocol's order, by which they are numbered
     identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
     provenance: Provenance  # where the result will come from
 
@@ -168,6 +174,7 @@ def make_plan(
     """
     agent_class = agent_class or load_agent_class(options.agent)
     task = task_as_played(options.agent, agent_class, task or options.task, resolver)
+    _check_episodes(options, task.options)
     options, config = _with_checkpoint(options, agent_class), config_of(options, agent_class)
     if task.options.track is None or task.options.mazes is None:
         options = options.replace(episodes_per_distance=options.episodes_per_distance or EPISODES_PER_DISTANCE)
@@ -175,16 +182,18 @@ def make_plan(
         with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
             build_agent(options, task, agent_class)
     if trials is None:
-        trials = select_trials(task, options.episodes_per_distance, options.seed, options.episodes_per_maze)
+        per_maze = options.episodes_per_maze or FROZEN_PER_MAZE
+        trials = select_trials(task, options.episodes_per_distance, options.seed, per_maze)
     origin = provenance(options, task, agent_class)
     world = largest_spec(task.mazes[0])  # the hash of the mazes tells the walls, too
+    is_part = options.episodes_per_maze not in (None, FROZEN_PER_MAZE)
     identity = {
         "agent": options.agent,
         **task.options.to_json(),
         "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart, as it does older maps
         **({} if task.options.shown is None else {"shown": "own"}),
         "episodes_per_distance": options.episodes_per_distance,
-        **({"episodes_per_maze": per_maze} if (per_maze := options.episodes_per_maze) < FROZEN_PER_MAZE else {}),
+        **({"episodes_per_maze": options.episodes_per_maze} if is_part else {}),
         **({} if config is None else {"config": config.identity()}),
         "seed": options.seed,
         **{name: getattr(origin, name) for name in _IDENTIFYING},
@@ -193,7 +202,7 @@ def make_plan(
     }
     if options.checkpoint is not None:  # agents may change the working folder
         options = dataclasses.replace(options, checkpoint=str(pathlib.Path(options.checkpoint).absolute()))
-    return Plan(options, task, agent_class, tuple(trials), identity, provenance=origin)
+    return Plan(options, task, agent_class, trials, identity, provenance=origin)
 
 
 def _square(side: int) -> str:
@@ -224,6 +233,14 @@ def task_as_played(
     for name in agent_class.needs_sensors:
         task.interface.require_sensor(name, agent)
     return task
+
+
+def _check_episodes(options: EvalOptions, task: TaskOptions) -> None:
+    """Raises `InputError` if a number of episodes is given that the task would ignore."""
+    counting = counting_option(task)
+    for name in EPISODES:
+        if (number := getattr(options, name)) is not None and name != counting:
+            raise InputError(f"expected {_COUNTING[counting]}, found {name} {number}")
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:

@@ -1,72 +1,47 @@
-"""Pools that run chunks: in this process, or in worker processes."""
+"""A pool that runs chunks: in this process, or in worker processes."""
 
 from __future__ import annotations
 
 import concurrent.futures
 import concurrent.futures.process
-import contextlib
+import dataclasses
+import functools
 import multiprocessing
 import multiprocessing.resource_tracker
 import multiprocessing.synchronize
 import os
+import pickle
 import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from typing import Protocol
 
 from mazebench import stopping
+from mazebench.agent import Agent
+from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Chunk, Result, run_chunk
-from mazebench.evaluation.eval_options import RunOptions
+from mazebench.evaluation.plan import Plan
 
 _PATIENCE = 0.5  # seconds to wait for a chunk to end before the caller may look for signals
 _NO_GUARD = 86  # exit status of a worker whose script starts workers again
 _LONGEST_STEP = 10.0  # seconds that a step may take until workers are ended that were asked to stop
 
 
-class Pool(Protocol):
-    """Runs chunks; used for all evaluations of a command."""
+class Pool:
+    """Runs the chunks of all evaluations of a command; a context manager.
 
-    num_workers: int  # chunks that run at a time in other processes; 0 for this process, which yields each step
-    num_threads: int  # of a chunk's simulation; 0 for all cores
+    It has worker processes, which start with the first chunk and are kept until the end. Without any, chunks run in
+    this process.
+    """
 
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
-        """Yields the results of the episodes that ended, in any order; now and then none.
-
-        Raises:
-          InputError, RunError: what a chunk raised.
-          RunError: if a worker ended abruptly.
-        """
-
-
-@contextlib.contextmanager
-def open_pool(run: RunOptions) -> Iterator[Pool]:
-    """Yields the pool that is asked for and ends it."""
-    if run.workers:
-        with _Processes(run.workers) as processes:
-            yield processes
-    else:
-        yield _ThisProcess()
-
-
-class _ThisProcess:
-    num_workers = 0
-    num_threads = 0
-
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
-        for chunk in chunks:
-            yield from run_chunk(chunk)
-
-
-class _Processes:
-    """Worker processes, started with the first chunk and kept until the end."""
-
-    num_threads = 1
-
-    def __init__(self, workers: int):
-        self.num_workers = workers
+    def __init__(self, num_workers: int):
+        self.num_workers = num_workers
+        self._executor: concurrent.futures.Executor | None = None
+        self._processes: set[multiprocessing.process.BaseProcess] = set()
+        if not num_workers:
+            return
         # A worker first runs the script that started it, which must not start workers of its own.
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             os._exit(_NO_GUARD)
@@ -78,18 +53,30 @@ class _Processes:
         context = multiprocessing.get_context("spawn")
         self._stop = context.Event()
         self._executor = concurrent.futures.ProcessPoolExecutor(
-            workers, context, initializer=_begin_worker, initargs=(self._stop,)
+            num_workers, context, initializer=_begin_worker, initargs=(self._stop,)
         )
-        self._processes: set[multiprocessing.process.BaseProcess] = set()
 
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
+    def run(self, plan: Plan, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
+        """Yields the results of the episodes that ended, in any order; now and then none.
+
+        Raises:
+          InputError, RunError: what a chunk raised.
+          RunError: if a worker ended abruptly.
+        """
+        if self._executor is None:
+            for chunk in chunks:
+                yield from run_chunk(plan, chunk)
+            return
+
+        # The class may have been made of a `SingleAgent`: a worker loads it by its name.
+        packed = pickle.dumps(dataclasses.replace(plan, agent_class=Agent))
         # Workers start here. They inherit that SIGINT is blocked, and so leave Ctrl-C to this process. The tracker,
         # which would start with the first of them, undoes the mask.
         multiprocessing.resource_tracker.ensure_running()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         before = set(multiprocessing.active_children())
         try:
-            waiting = {self._executor.submit(_run_until_stopped, chunk) for chunk in chunks}
+            waiting = {self._executor.submit(_run_until_stopped, packed, chunk) for chunk in chunks}
         except OSError as error:
             raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}") from error
         finally:
@@ -115,6 +102,7 @@ class _Processes:
 
     def _broken(self) -> InputError | RunError:
         """Returns the error of workers that ended abruptly."""
+        assert self._executor is not None
         self._executor.shutdown()  # whose thread waits for the workers: a second one could be told no exit status
         if any(process.exitcode == _NO_GUARD for process in self._processes):
             return InputError(
@@ -123,20 +111,28 @@ class _Processes:
             )
         return RunError("a worker process ended abruptly; what ended is kept, go on with --resume")
 
-    def __enter__(self) -> _Processes:
+    def __enter__(self) -> Pool:
         return self
 
     def __exit__(self, kind: object, *exception: object) -> None:
         if kind is not None:
             for process in self._processes:  # which may be in the middle of a chunk
                 process.terminate()
-        self._executor.shutdown(cancel_futures=True)
+        if self._executor is not None:
+            self._executor.shutdown(cancel_futures=True)
 
 
 _stop: multiprocessing.synchronize.Event  # of a worker's parent
 
 
-def _run_until_stopped(chunk: Chunk) -> tuple[list[Result], InputError | RunError | None]:
+@functools.lru_cache(maxsize=1)
+def _unpacked(packed: bytes) -> Plan:
+    """Returns the same plan for all chunks of an evaluation that a worker runs, so that they share the mazes."""
+    plan = pickle.loads(packed)  # noqa: S301  # of the process that started this one
+    return dataclasses.replace(plan, agent_class=load_agent_class(plan.options.agent))
+
+
+def _run_until_stopped(packed: bytes, chunk: Chunk) -> tuple[list[Result], InputError | RunError | None]:
     """Returns the results of the episodes of a chunk, and what ended it before all of them had ended.
 
     Errors are of the plain kinds, since what caused them need not survive the way to another process. A chunk that is
@@ -144,7 +140,7 @@ def _run_until_stopped(chunk: Chunk) -> tuple[list[Result], InputError | RunErro
     """
     ended: list[Result] = []
     try:
-        for results in run_chunk(chunk):
+        for results in run_chunk(_unpacked(packed), chunk):
             ended += results
             if _stop.is_set():
                 break

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mazebench.results.records import RECALLS
+from mazebench.results.metrics import RECALLS
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.world.angles import wrap_angle
 
@@ -37,7 +37,8 @@ def recalls(hits: Sequence[Hit | None]) -> dict[str, float]:
     if all(each is None for each in hits):
         return {}
     found = np.array([each or (False, False) for each in hits], dtype=float)
-    return dict(zip(RECALLS, [*found.mean(axis=0).tolist(), *found[-1].tolist()], strict=True))
+    shares = [*found.mean(axis=0).tolist(), *found[-1].tolist()]
+    return {recall.name: share for recall, share in zip(RECALLS, shares, strict=True)}
 
 
 def pose_on_map(shown: ShownMap, pose: np.ndarray) -> np.ndarray | None:

@@ -1,8 +1,8 @@
 """The folder of an evaluation while it runs. What has ended survives a kill at any moment.
 
-An episode that ends becomes a line of `journal.jsonl`, in any order, without the oracle's steps where they are not
-frozen. One with several goals becomes a line for each leg. When all have ended, `episodes.jsonl`, `trajectories.npz`
-and last `summary.json` are written, and the journal is removed.
+The result of an episode that ends becomes a line of `journal.jsonl`, in any order, or with several goals a line for
+each leg. When all have ended, `episodes.jsonl`, `trajectories.npz` and last `summary.json` are written, and the journal
+is removed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Result, to_record, to_trajectory
 from mazebench.evaluation.plan import Plan
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
-from mazebench.results.records import REPORTED, Record, Summary
+from mazebench.results.records import Record, Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
@@ -54,7 +54,9 @@ _Pose = tuple[pydantic.FiniteFloat, pydantic.FiniteFloat, pydantic.FiniteFloat]
 class _Line(pydantic.BaseModel):
     """A line of the journal."""
 
-    record: Record
+    model_config = pydantic.ConfigDict(strict=True, extra="forbid", arbitrary_types_allowed=True)
+
+    result: Result  # without what was kept
     # As `Trajectory`; empty if none is kept.
     trajectory: tuple[()] | tuple[list[_Pose], list[_Pose] | None]
 
@@ -84,7 +86,7 @@ class Store:
         lines = read_lines(folder / JOURNAL, _Line)
         if self._is_new and lines:
             raise InputError(f"{folder}: expected {CONFIG} of the run in {JOURNAL}, found none; name another folder")
-        ended = [self._checked(line) for line in lines]
+        ended = [self._read(line) for line in lines]
         self.record = record or any(trajectory for _, trajectory in ended)
         # By episode and leg; an episode whose last legs a kill cut off is run again.
         whole = {each.episode for each, _ in ended if each.leg == self._num_legs}
@@ -115,27 +117,20 @@ class Store:
         """The records of the episodes that have ended, in protocol order."""
         return [self._ended[key][0] for key in sorted(self._ended)]
 
-    def _checked(self, line: _Line) -> tuple[Record, Trajectory | None]:
-        """Returns what a line of the journal holds.
+    def _read(self, line: _Line) -> tuple[Record, Trajectory | None]:
+        """Returns the record of a line of the journal, and its trajectory.
 
         Raises:
-          InputError: if it is of no episode of the plan, or was not written of one.
+          InputError: if it is of no episode of the plan.
         """
-        record, where = line.record, f"{self.folder / JOURNAL}: expected records of the run's episodes"
-        number, told = record.episode, record.model_extra or {}
-        reported = {name: told[name] for name in REPORTED if name in told}
-        if number >= len(self._plan.trials) or record.leg > self._num_legs:
-            raise InputError(f"{where}, found one of {number}, leg {record.leg}")
-        is_blocked, after_miss = told.get("blocked") is True, record.start if record.after_missed_goal else None
-        driven = record.success, record.steps, record.path_length
-        result = Result(number, *driven, is_blocked, (), reported, record.leg, after_miss)
-        written, found = to_record(self._plan, result).model_dump(), record.model_dump()
-        if other := [name for name in written | found if found.get(name) != written.get(name)]:
-            raise InputError(f"{where}, found {str(found.get(other[0]))[:80]!r} as {other[0]} of episode {number}")
+        result, where = line.result, f"{self.folder / JOURNAL}: expected results of the run's episodes"
+        if result.number >= len(self._plan.trials) or not 1 <= result.leg <= self._num_legs:
+            raise InputError(f"{where}, found one of {result.number}, leg {result.leg}")
         poses = [None if each is None else np.array(each, dtype=np.float32) for each in line.trajectory]
-        if not all(each is None or len(each) == record.steps + 1 for each in poses):
-            raise InputError(f"{where}, found a trajectory of another length of episode {number}")
-        return record, Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
+        if not all(each is None or len(each) == result.steps + 1 for each in poses):
+            raise InputError(f"{where}, found a trajectory of another length of episode {result.number}")
+        trajectory = Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
+        return to_record(self._plan, result), trajectory
 
     def append(self, results: Sequence[Result]) -> None:
         """Adds episodes that ended.
@@ -143,12 +138,14 @@ class Store:
         Raises:
           RunError: if the disk is full or can't be written any more.
         """
-        plan = self._plan
-        ended = {(each.number, each.leg): (to_record(plan, each), to_trajectory(plan, each)) for each in results}
+        ended = {
+            (each.number, each.leg): (to_record(self._plan, each), to_trajectory(self._plan, each)) for each in results
+        }
         with self._keeping_what_is_written():
-            for record, trajectory in ended.values():
+            for result in results:
+                _, trajectory = ended[result.number, result.leg]
                 poses = [None if each is None else each.tolist() for each in trajectory or ()]
-                self._journal.write(to_line({"record": record.model_dump(), "trajectory": poses}))
+                self._journal.write(to_line({"result": result._replace(kept=())._asdict(), "trajectory": poses}))
             self._journal.flush()
         self._ended |= ended
 

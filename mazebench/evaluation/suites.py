@@ -11,12 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mazebench.agent import Interface
-from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress, run_plan
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
-from mazebench.evaluation.pool import open_pool
+from mazebench.evaluation.pool import Pool
 from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import DEV, SIZES, manifest_hash
 from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
@@ -39,8 +38,8 @@ class Part:
 
     name: str
     task: TaskOptions
-    episodes_per_distance: int = EPISODES_PER_DISTANCE
-    episodes_per_maze: int = FROZEN_PER_MAZE
+    episodes_per_distance: int | None = None  # as in `EvalOptions`, likewise the other one
+    episodes_per_maze: int | None = None
 
 
 def _hierarchical(name: str, **options: Any) -> Part:
@@ -155,7 +154,7 @@ def run_suite(
         for part in SUITES[suite]
     }
     plans = _playable(plans, out, suite)
-    with open_pool(run) as pool:
+    with Pool(run.workers) as pool:
         make_folder(out)
         _prepare(out, suite, agents, seed, plans, run.resume)
         total = sum(len(plan.trials) for plan in plans.values())

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mazebench.constants import FROZEN_PER_MAZE, STEP_TIME
+from mazebench.constants import STEP_TIME
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions
@@ -30,6 +30,7 @@ from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.sensors import LIDAR, SENSORS
 from mazebench.tasks.sensors.cameras import as_colors
 from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.trials import counting_option
 from mazebench.world.ray_casting import ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
 
@@ -84,14 +85,10 @@ def film_result(result: Result, number: int, out: pathlib.Path, view: str, pixel
     played_task(summary)  # refuses mazes that were changed
 
     # The evaluation's plan.
-    options = EvalOptions(
-        agent=summary.agent,
-        task=summary.task,
-        episodes_per_distance=origin.episodes_per_distance,
-        episodes_per_maze=read_json(folder / CONFIG).get("episodes_per_maze", FROZEN_PER_MAZE),
-        seed=origin.seed,
-        **chosen,
-    )
+    counting, config = counting_option(summary.task), read_json(folder / CONFIG)
+    if counting is not None:
+        chosen[counting] = config.get(counting)
+    options = EvalOptions(agent=summary.agent, task=summary.task, seed=origin.seed, **chosen)
     plan = make_plan(options.replace(overrides={**summary.config, **options.overrides}))
     expected, found = (str(each.checkpoint_sha256)[:8] for each in (origin, plan.provenance))
     if found != expected:

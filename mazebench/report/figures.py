@@ -14,8 +14,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mazebench.report.table import METRICS, Table
-from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.report.table import Table
+from mazebench.results.metrics import HEADLINE, SPL, SPL_GRID
 
 _WIDTH = 7.0  # inches, of a page's text
 _HEIGHT = 2.2  # inches, of a panel
@@ -62,16 +62,16 @@ def draw_table(table: Table, labels: Sequence[str]) -> Figure:
 
     SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours.
     """
-    is_printed = (table.values.source.eq("paper") & table.values.metric.eq("spl_grid")).any()
-    metrics = ("success_rate", next(iter(ON_TIME_METRICS)), "spl_grid" if is_printed else "spl")
+    is_printed = (table.values.source.eq("paper") & table.values.metric.eq(SPL_GRID.name)).any()
+    metrics = [SPL_GRID if is_printed and metric is SPL else metric for metric in HEADLINE]
     is_curve = table.row_name == "distance" and len(table.x) > 3  # few points have bars: bands over one are not seen
     x_name = f"{table.row_name}{' (cells)' if 'distance' in table.row_name else ''}"
     single = table.values[table.values.runs.isna() & table.values.row.isin(table.x)]  # no means over training runs
-    single = single.assign(x=single.row.astype(object).map(table.x))
+    single, ticks = single.assign(x=single.row.astype(object).map(table.x)), {x: row for row, x in table.x.items()}
     panels = [
-        Panel(name[0].upper() + name[1:], x_name, points, {x: row for row, x in table.x.items()}, is_curve)
-        for metric, name in METRICS.items()
-        if metric in metrics and len(points := single[single.metric == metric])
+        Panel(metric.title[0].upper() + metric.title[1:], x_name, points, ticks, is_curve)
+        for metric in metrics
+        if len(points := single[single.metric == metric.name])
     ]
     return draw_panels(table.title, panels, labels)
 

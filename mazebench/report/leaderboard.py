@@ -18,13 +18,13 @@ import numpy as np
 import pandas as pd
 import pydantic
 
-from mazebench.constants import ON_TIME, STEP_TIME
+from mazebench.constants import STEP_TIME
 from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.results.intervals import mean_interval
-from mazebench.results.metrics import is_on_time
+from mazebench.results.metrics import ON_TIMES
 from mazebench.results.naming import noise_in_words, sensors_in_words, title_of
 from mazebench.results.reading import SUITE, SUMMARY, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
@@ -187,7 +187,7 @@ def _read_episodes(result: Result) -> pd.DataFrame:
         found = f"{driven[number]:.1f} m in {seconds[number]:.1f} s in episode {number}"
         raise InputError(f"{result.folder}: expected bodies of at most {FASTEST:.1f} m/s, found {found}")
 
-    on_time = is_on_time(records, ON_TIME[0])
+    on_time = ON_TIMES[0].of(records)
     return pd.DataFrame(
         {"part": title_of(task), "maze": column(records, "maze"), "success": success, "on_time": on_time}
     )

@@ -9,16 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from mazebench.results.metrics import ON_TIME_METRICS
-from mazebench.results.records import RECALLS
+from mazebench.results.metrics import METRICS
 
-METRICS = {  # of each episode, with their names
-    "success_rate": "success rate",
-    **{metric: f"on time ({factor:g})" for metric, factor in ON_TIME_METRICS.items()},
-    "spl": "SPL",
-    "spl_grid": "SPL by grid distance",
-}
-ALL_METRICS = METRICS | RECALLS  # the latter of agents that report poses
 # Of `Table.values`; `column` is an agent, `source` is "measured" or "paper", `runs` are training runs of a mean over
 # several, `mark` is "*" if the agent learned, but never on maps of this scale.
 COLUMNS = ["metric", "row", "column", "source", "episodes", "value", "low95", "high95", "runs", "mark"]
@@ -37,7 +29,7 @@ class Table:
     @property
     def metrics(self) -> list[str]:
         """The metrics of which there are values."""
-        return [metric for metric in ALL_METRICS if (self.values.metric == metric).any()]
+        return [metric for metric in METRICS if (self.values.metric == metric).any()]
 
     @property
     def x(self) -> dict[str, float]:
@@ -50,7 +42,7 @@ class Table:
         texts = pd.Series([_format(**value) for value in values.to_dict("records")], [values.row, values.column])
         columns = values.column.cat.remove_unused_categories().cat.categories
         wide = texts.unstack(fill_value="").reindex(values.row.cat.categories, columns=columns, fill_value="")
-        return wide.rename_axis(index=None, columns=f"{ALL_METRICS[metric]}, by {self.row_name}")
+        return wide.rename_axis(index=None, columns=f"{METRICS[metric].title}, by {self.row_name}")
 
     def to_files(self) -> dict[str, str]:
         """Returns the table by the suffix of a file; the CSV has a line for each value, with more digits."""

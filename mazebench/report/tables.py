@@ -11,8 +11,9 @@ import pandas as pd
 
 from mazebench.options import fields_of
 from mazebench.report.episodes import at_common_distances, common_distances, facts_of
-from mazebench.report.table import ALL_METRICS, Table, make_values
+from mazebench.report.table import Table, make_values
 from mazebench.results.intervals import Estimate, mean_interval, runs_interval
+from mazebench.results.metrics import METRICS
 from mazebench.results.naming import described
 from mazebench.results.paper import printed
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
@@ -52,14 +53,14 @@ def make_table(name: str, title: str, note: str, row_name: str, rows: Rows, pape
     episodes = pd.concat(rows, names=["row"]).reset_index("row")
     for (label, row), own in episodes.groupby(["label", "row"], observed=True):
         mark = "*" if own.is_untrained.iloc[0] else ""
-        for metric in ALL_METRICS:
+        for metric in METRICS:
             if metric not in own or own[metric].isna().any():
                 continue  # an agent that reports no poses
             mean = mean_interval(own[metric].to_numpy(), own.maze_index.to_numpy())
             lines.append(_line(metric, row, label, mean, len(own)) | {"mark": mark})
     several = episodes[episodes.groupby("agent").run.transform("nunique") > 1]
     for (agent, row), own in several.groupby(["agent", "row"], sort=False):
-        for metric in own.columns.intersection(list(ALL_METRICS)):
+        for metric in own.columns.intersection(list(METRICS)):
             runs = own.pivot_table(values=metric, index="run", columns=["maze_index", "trial"])
             if len(runs) > 1 and not runs.isna().any(axis=None):  # runs of the same episodes
                 mean = runs_interval(runs.to_numpy(), runs.columns.get_level_values("maze_index").to_numpy())

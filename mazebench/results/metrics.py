@@ -1,24 +1,43 @@
-"""Success rate, SPL and their intervals. docs/metrics.md has the definitions with worked examples.
+"""The metrics of episodes, their means and intervals. docs/metrics.md has the definitions with worked examples.
 
 `E` is the number of episodes.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from mazebench.constants import ON_TIME
-from mazebench.results.intervals import mean_interval
-from mazebench.results.records import RECALLS, REPORTED, Figures, Record, column
+from mazebench.results.intervals import Estimate, mean_interval
+from mazebench.results.records import Figures, Record, column
 
-# What a summary calls a metric, and the field of a record that it is the mean of.
-METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}
-ON_TIME_METRICS = {f"on_time_{k:g}": k for k in ON_TIME}  # by the name in comparisons and reports
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A number in [0, 1] of each episode, whose mean is reported with a 95 % interval."""
+
+    name: str  # in comparisons, and in tables as files
+    title: str  # of a report's table
+    head: str  # of its column on a terminal, which metrics with the same head share
+    of: Callable[[Sequence[Record]], np.ndarray]  # returns `[E]`
+    shows_interval: bool = False  # on a terminal
+    needs: str | None = None  # a further key of records, without which there is no such metric
+    group: str = ""  # in a summary: its mean is under `key` of this group, or else under its own name
+    key: str = ""
+
+    def estimate(self, figures: Figures) -> Estimate | None:
+        """Returns the mean in some figures of a summary; None if they have none."""
+        mean, ends = (getattr(figures, (self.group or self.name) + suffix, None) for suffix in ("", "_ci95"))
+        if self.group and mean and ends:
+            mean, ends = mean.get(self.key), ends.get(self.key)
+        return Estimate(mean, *ends) if isinstance(mean, float) and ends else None
 
 
 def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.ndarray:
@@ -50,12 +69,44 @@ def is_on_time(records: Sequence[Record], factor: float) -> np.ndarray:
     return column(records, "success") & (column(records, "steps") <= limits)
 
 
+def _field(name: str) -> Callable[[Sequence[Record]], np.ndarray]:
+    return functools.partial(column, name=name)
+
+
+SUCCESS_RATE = Metric(
+    name="success_rate", title="success rate", head="success rate", of=_field("success"), shows_interval=True
+)
+ON_TIMES = tuple(
+    Metric(
+        name=f"on_time_{factor:g}",
+        title=f"on time ({factor:g})",
+        head="on time",
+        of=functools.partial(is_on_time, factor=factor),
+        group="on_time",
+        key=f"{factor:g}",
+    )
+    for factor in ON_TIME
+)
+SPL = Metric(name="spl", title="SPL", head="SPL", of=_field("spl"), shows_interval=True)
+SPL_GRID = Metric(name="spl_grid", title="SPL by grid distance", head="SPL by grid", of=_field("spl_grid"))
+# Of the poses that an agent reports, over an episode and in its last step.
+RECALLS = tuple(
+    Metric(name=name, title=title, head=head, of=_field(name), needs=name, group="recall", key=name)
+    for name, title, head in (
+        ("recall_1m", "pose within 1 m", "pose 1 m"),
+        ("recall_1m_30deg", "pose within 1 m and 30 degrees", "pose 1 m, 30 deg"),
+        ("final_recall_1m", "pose at the end within 1 m", "pose 1 m"),
+        ("final_recall_1m_30deg", "pose at the end within 1 m and 30 degrees", "pose 1 m, 30 deg"),
+    )
+)
+METRICS = {metric.name: metric for metric in (SUCCESS_RATE, *ON_TIMES, SPL, SPL_GRID, *RECALLS)}
+HEADLINE = (SUCCESS_RATE, ON_TIMES[0], SPL)  # where there is room for three
+
+
 def scores(records: Sequence[Record]) -> dict[str, np.ndarray]:
-    """Returns `[E]` float by metric, of `METRICS`, `ON_TIME_METRICS` and, where all records have them, `RECALLS`."""
-    are_told = all(RECALLS.keys() <= (record.model_extra or {}).keys() for record in records)
-    names = METRICS | {name: name for name in RECALLS if are_told}
-    found = {metric: column(records, name).astype(float) for metric, name in names.items()}
-    return found | {name: is_on_time(records, k).astype(float) for name, k in ON_TIME_METRICS.items()}
+    """Returns `[E]` float by the names of `METRICS`, without those that not all records have."""
+    told = set.intersection(*({None, *(record.model_extra or {})} for record in records))
+    return {name: metric.of(records).astype(float) for name, metric in METRICS.items() if metric.needs in told}
 
 
 def summarize(records: Sequence[Record]) -> dict[str, Any]:
@@ -75,7 +126,7 @@ def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
     and those of several goals after their number ("goal 1").
     """
     told = records[0].model_extra or {}
-    facts = [name for name, value in told.items() if isinstance(value, bool) and name not in REPORTED]
+    facts = [name for name, value in told.items() if isinstance(value, bool) and name != "notes"]
     groups = {
         f"{'' if holds else 'not '}{fact}": column(records, fact) == holds for fact in facts for holds in (True, False)
     }
@@ -86,15 +137,12 @@ def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
 
 
 def _figures(records: Sequence[Record]) -> Figures:
-    mazes = column(records, "maze")
-    means = {metric: mean_interval(values, mazes) for metric, values in scores(records).items()}
-    values: dict[str, Any] = {"n": len(records)}
-    for metric in METRICS:
-        values |= {metric: means[metric].value, f"{metric}_ci95": (means[metric].low, means[metric].high)}
-    on_time = {f"{k:g}": means[metric] for metric, k in ON_TIME_METRICS.items()}
-    values["on_time"] = {k: mean.value for k, mean in on_time.items()}
-    values["on_time_ci95"] = {k: (mean.low, mean.high) for k, mean in on_time.items()}
-    recalls = {name: means[name] for name in RECALLS if name in means}
-    values["recall"] = {name: mean.value for name, mean in recalls.items()}
-    values["recall_ci95"] = {name: (mean.low, mean.high) for name, mean in recalls.items()}
+    mazes, values = column(records, "maze"), dict[str, Any](n=len(records))
+    for name, of_episodes in scores(records).items():
+        metric, mean = METRICS[name], mean_interval(of_episodes, mazes)
+        for suffix, value in (("", mean.value), ("_ci95", (mean.low, mean.high))):
+            if metric.group:
+                values.setdefault(metric.group + suffix, {})[metric.key] = value
+            else:
+                values[name + suffix] = value
     return Figures.model_validate(values)

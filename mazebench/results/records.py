@@ -16,15 +16,6 @@ from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS, distance_of
 
-# Of the poses that an agent reports, over an episode and at its end; and all that a record has of reports.
-RECALLS = {
-    "recall_1m": "pose within 1 m",
-    "recall_1m_30deg": "pose within 1 m and 30 degrees",
-    "final_recall_1m": "pose at the end within 1 m",
-    "final_recall_1m_30deg": "pose at the end within 1 m and 30 degrees",
-}
-REPORTED = (*RECALLS, "notes")
-
 _LARGEST = 2**53  # from here on, not every whole number is a float
 
 Count = Annotated[int, pydantic.Field(ge=0, lt=_LARGEST)]
@@ -52,8 +43,8 @@ class Record(_Stored):
 
     The strengths of the perturbations follow as further keys; on a track also `level` and its facts, such as
     `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres; where a user set them, `lidar_noise`
-    and `odometry_noise`; of an agent that reports also `RECALLS` and `notes`. With several goals, `after_miss` says
-    whether the goal before was missed: then the leg began where the body was.
+    and `odometry_noise`; of an agent that reports also `metrics.RECALLS` and `notes`. With several goals, `after_miss`
+    says whether the goal before was missed: then the leg began where the body was.
     """
 
     agent: Name
@@ -92,7 +83,7 @@ class Record(_Stored):
 
 
 class Figures(_Stored):
-    """Means over some episodes with their 95 % intervals."""
+    """Means over some episodes with their 95 % intervals. Further metrics follow as further keys."""
 
     n: Count  # episodes
     success_rate: Share
@@ -103,7 +94,7 @@ class Figures(_Stored):
     spl_grid_ci95: tuple[Share, Share]
     on_time: dict[str, Share]  # by the factor of the oracle's steps as text: "1.25", "2"
     on_time_ci95: dict[str, tuple[Share, Share]]
-    recall: dict[str, Share] = {}  # by the names in `RECALLS`; left out where no poses were reported
+    recall: dict[str, Share] = {}  # by the names of recalls; left out where no poses were reported
     recall_ci95: dict[str, tuple[Share, Share]] = {}
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from mazebench.maps.benchmark import (
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import DISTANCES
 from mazebench.world.mjcf import BODY_RADIUS
 
@@ -74,18 +76,47 @@ def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split:
 
     The paper's protocol has 1,500 of the local task and 20 of the hierarchical one; the tracks share 240.
     """
-    trials = []
-    for row in csv.DictReader(read_asset(episodes_file(task, size, split), benchmark).splitlines()):
-        episode = Episode(
-            maze=int(row["maze"]),
-            start=(int(row["start_row"]), int(row["start_column"])),
-            goal=(int(row["goal_row"]), int(row["goal_column"])),
-            yaw=float(row["yaw"]),
-            seed=int(row["seed"]),
-        )
-        oracle_steps = int(row["oracle_steps"]) if row["oracle_steps"] else None
-        trials.append(Trial(episode, int(row["distance"]), float(row["shortest_path"]), oracle_steps))
-    return tuple(trials)
+    return tuple(_FrozenTrials(_frozen_rows(task, size, benchmark, split)))
+
+
+def _frozen_rows(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split: str = "eval") -> list[dict[str, str]]:
+    return list(csv.DictReader(read_asset(episodes_file(task, size, split), benchmark).splitlines()))
+
+
+class _FrozenTrials(Sequence[Trial]):
+    """The trials of rows of frozen episodes, each of which is parsed when it is asked for."""
+
+    def __init__(self, rows: Sequence[Mapping[str, str]]):
+        self._rows, self._parsed = rows, dict[int, Trial]()
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[each] for each in range(len(self))[index]]
+        if index not in self._parsed:
+            self._parsed[index] = _parse(self._rows[index])
+        return self._parsed[index]
+
+
+def _parse(row: Mapping[str, str]) -> Trial:
+    episode = Episode(
+        maze=int(row["maze"]),
+        start=(int(row["start_row"]), int(row["start_column"])),
+        goal=(int(row["goal_row"]), int(row["goal_column"])),
+        yaw=float(row["yaw"]),
+        seed=int(row["seed"]),
+    )
+    oracle_steps = int(row["oracle_steps"]) if row["oracle_steps"] else None
+    return Trial(episode, int(row["distance"]), float(row["shortest_path"]), oracle_steps)
+
+
+def counting_option(options: TaskOptions) -> str | None:
+    """Returns the name of the option that says how many episodes of a task are evaluated; None where none does."""
+    if options.track is not None and options.frozen_split is not None:
+        return "episodes_per_maze"
+    return None if options.is_hierarchical else "episodes_per_distance"
 
 
 def select_trials(
@@ -93,7 +124,7 @@ def select_trials(
     episodes_per_distance: int | None = EPISODES_PER_DISTANCE,
     seed: int = 0,
     episodes_per_maze: int = FROZEN_PER_MAZE,
-) -> list[Trial]:
+) -> Sequence[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
     In the benchmark's mazes its frozen episodes are taken as far as they go: of a track all of the task's distances,
@@ -108,26 +139,32 @@ def select_trials(
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    frozen_split = task.options.frozen_split
+    frozen_split, wanted = task.options.frozen_split, episodes_per_distance or _PER_MAZE
     if frozen_split is not None and task.options.track is not None:
-        trials = frozen_trials("local", task.size, TRACKS_BENCHMARK, frozen_split)
-        are_frozen = task.options.num_goals > 1 and task.distances == DISTANCES
-        later = frozen_legs(frozen_split, trials) if are_frozen else [()] * len(trials)
-        return [
-            with_later_legs(task, trial, legs)
-            for index, (trial, legs) in enumerate(zip(trials, later, strict=True))
-            if trial.distance in task.distances and (index - trial.episode.maze) % FROZEN_PER_MAZE < episodes_per_maze
+        rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
+        chosen = [
+            index
+            for index, row in enumerate(rows)
+            if int(row["distance"]) in task.distances
+            and (index - int(row["maze"])) % FROZEN_PER_MAZE < episodes_per_maze
         ]
+        trials = _FrozenTrials([rows[index] for index in chosen])
+        if task.options.num_goals == 1:
+            return trials
+        are_frozen = task.distances == DISTANCES
+        later = frozen_legs(frozen_split, _FrozenTrials(rows)) if are_frozen else [()] * len(rows)
+        return [with_later_legs(task, trial, later[index]) for index, trial in zip(chosen, trials, strict=True)]
     if frozen_split is not None and task.options.is_hierarchical:
-        return list(frozen_trials(task.options.task, task.size))
-    wanted = episodes_per_distance or _PER_MAZE
+        return _FrozenTrials(_frozen_rows(task.options.task, task.size))
     if frozen_split is not None and set(task.distances) <= set(EVAL_DISTANCES) and wanted <= EPISODES_PER_DISTANCE:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
-        return [
-            trial
-            for index, trial in enumerate(frozen_trials(task.options.task, task.size))
-            if index % EPISODES_PER_DISTANCE < wanted and trial.distance in task.distances
-        ]
+        return _FrozenTrials(
+            [
+                row
+                for index, row in enumerate(_frozen_rows(task.options.task, task.size))
+                if index % EPISODES_PER_DISTANCE < wanted and int(row["distance"]) in task.distances
+            ]
+        )
     return [with_later_legs(task, trial) for trial in draw_trials(task, episodes_per_distance, seed)]
 
 
