@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from acting import inputs_of
 from mazebench_agents.robot import planning
-from mazebench_agents.robot.body import FORWARD, Body
 from mazebench_agents.robot.driving import Drive
 from mazebench_agents.robot.map_matching import MapBelief
+from mazebench_agents.robot.moving_body import FORWARD, MovingBody
 from mazebench_agents.robot.senses import Memory
 from run_folders import records_of
 
@@ -22,6 +22,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
+from mazebench.world.bodies import SLIDER
 
 
 def ring(size: int = 7) -> np.ndarray:
@@ -59,7 +60,7 @@ class TestDriving:
     def test_a_drive_is_followed_until_the_body_is_off_it(self):
         blocked = ring() > 0.5
         path = planning.plan(ring(), goal_at((5, 5)), (1, 1))
-        drive, body = Drive(), Body(x=1.5, y=5.5, yaw=0.0, forward=0.0, left=0.0)
+        drive, body = Drive(), MovingBody(SLIDER, x=1.5, y=5.5, yaw=0.0, forward=0.0, left=0.0)
         action, (x, y) = drive.next(blocked, path, body, 1.0)
         assert action == FORWARD
         assert 1.6 < x < 2.2

@@ -177,7 +177,7 @@ def make_plan(
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed, options.episodes_per_maze)
     origin = provenance(options, task, agent_class)
-    world = largest_spec(task.mazes[0])  # the hash of the mazes tells the walls, too
+    world = largest_spec(task.mazes[0], task.body)  # the hash of the mazes tells the walls, too
     identity = {
         "agent": options.agent,
         **task.options.to_json(),

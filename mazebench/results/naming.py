@@ -9,6 +9,7 @@ from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.sensors.sensor import CAMERA_OPTIONS
 from mazebench.tasks.task_options import ENDS, TaskOptions
 from mazebench.tasks.tracks import LEVELS
+from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import PICTURES
 
 # Options that an agent may choose, or is not told, while the same is played.
@@ -45,11 +46,12 @@ def described(options: TaskOptions) -> str:
 
 
 def own_in_words(options: TaskOptions) -> tuple[str, ...]:
-    """Returns the choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
+    """Returns a user's choices besides the mazes: the body, the size of a cell, start and goal, noise on the senses."""
+    body = () if options.body == SLIDER.name else (f"body {options.body}",)
     scale = () if options.cell_size in (None, 1) else (f"cells of {options.cell_size:g} m",)
     shown = () if options.shown is None else ("an older map shown",)
     ends = (f"{name} {end}" for name in ENDS if (end := getattr(options, name)) is not None)
-    return (*scale, *shown, *ends, *noise_in_words(options))
+    return (*body, *scale, *shown, *ends, *noise_in_words(options))
 
 
 def noise_in_words(options: TaskOptions) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from dm_env import specs
 
+from mazebench.constants import STATE_SIZE
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, episode_level, perturbations_of
 from mazebench.tasks.perturbations.odometry import NoisyMotion
@@ -15,7 +16,6 @@ from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import Sensor, Worlds
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
-from mazebench.world.simulation import STATE_SIZE
 
 
 def observation_specs(task: Task) -> dict[str, specs.Array]:
