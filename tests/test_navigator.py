@@ -137,7 +137,9 @@ class TestReferences:
         context = np.stack([shown, shown, goal_at((1, 4)), goal_at((1, 1))])
         truth = Truth(true[None] > 0.5, np.zeros((1, 3)), np.array([[1, 4]]))
         inputs = inputs_of({"context": context[None]}, np.array([True]))._replace(truth=truth)
-        memory = Memory(MapBelief(shown, goal_at((1, 4)), 1, None, 7), Body(1.5, 5.5, 0.0, 0.0, 0.0), 0.01, 1.0)
+        memory = Memory(
+            MapBelief(shown, goal_at((1, 4)), 1, None, 7), MovingBody(SLIDER, 1.5, 5.5, 0.0, 0.0, 0.0), 0.01, 1.0
+        )
         agent = load_agent_class("navigator-told").build(Interface("local", 7, 7))
         for seen, expected in ((None, shown), ((2, 3), shown), ((1, 3), true)):
             if seen:
