@@ -13,7 +13,9 @@ import numpy as np
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.drawn import Mazes
+from mazebench.world.bodies import Body
 
+from .robot.motion import Motion
 from .robot.quickest import costs_of_actions, make_course
 
 _experts: weakref.WeakKeyDictionary[MazeVectorEnv, Expert] = weakref.WeakKeyDictionary()
@@ -46,7 +48,7 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
     if not rules.active.any():
         raise InputError("expected a call to reset() before that of labels(), found no episode under way")
     if envs not in _experts:
-        _experts[envs] = Expert(envs.task.mazes, envs.num_envs)
+        _experts[envs] = Expert(envs.task.mazes, envs.num_envs, envs.task.body)
     found = _experts[envs].costs(rules.maze, rules.target, rules.pose, envs.velocity())
     return found if costs else found.argmin(axis=1)
 
@@ -54,9 +56,9 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
 class Expert:
     """Costs of actions in B environments; the ways to a goal are computed once for each leg."""
 
-    def __init__(self, mazes: Mazes, num_envs: int):
-        """Knows `mazes`, which have one size and one cell size."""
-        self._mazes = mazes
+    def __init__(self, mazes: Mazes, num_envs: int, body: Body):
+        """Knows `mazes`, which have one size and one cell size, and the body that drives in them."""
+        self._mazes, self._body = mazes, body
         self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course
         self._arrays: tuple[np.ndarray, ...] = ()  # walls, ways left and goals of the courses
 
@@ -73,7 +75,7 @@ class Expert:
             if self._courses[slot] != course:
                 self._courses[slot] = course
                 walls = np.asarray(self._mazes[course[0]].walls)
-                made = make_course(walls, self._mazes[course[0]].cell_size, divmod(course[1], len(walls)))
+                made = make_course(self._body, walls, self._mazes[course[0]].cell_size, divmod(course[1], len(walls)))
                 of_course = made.walls, made.way_left, np.array([made.goal_x, made.goal_y])
                 if not self._arrays:
                     self._arrays = tuple(np.zeros((len(goal), *array.shape), array.dtype) for array in of_course)
@@ -81,4 +83,4 @@ class Expert:
                     arrays[slot] = array
         walls, way_left, goals = self._arrays
         cell_size = self._mazes[0].cell_size
-        return costs_of_actions(walls, way_left, goals, cell_size, pose, velocity)
+        return costs_of_actions(Motion.of(self._body), walls, way_left, goals, cell_size, pose, velocity)

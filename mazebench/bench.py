@@ -20,7 +20,6 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.kinds import generate
 from mazebench.tasks.task import TRAIN_DISTANCES, Task
 from mazebench.world.looks import LOOKS, PICTURES, PLAIN, VARIED, Camera
-from mazebench.world.mjcf import action_controls
 from mazebench.world.near_walls import near_walls_of
 from mazebench.world.ray_camera import RayCamera
 from mazebench.world.simulation import MujocoSimulation
@@ -108,7 +107,7 @@ def _rate(side: Side, seconds: float) -> float:
 
 def _bare_loop(task: Task) -> Callable[[np.ndarray], None]:
     """Returns agent steps of one simulation by mj_step alone: no task, observations or resets."""
-    maze, walls, controls = task.mazes[0], near_walls_of(task.mazes, 1), action_controls()
+    maze, walls, controls = task.mazes[0], near_walls_of(task.mazes, 1, task.body), task.body.action_controls()
     simulation = MujocoSimulation(walls.model, walls)
     model, data = simulation.model, simulation.data
     data.qpos[:2] = maze.point(maze.free_cells[0])

@@ -14,6 +14,7 @@ ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times t
 EPISODES_PER_DISTANCE = 5  # of an evaluation, in each maze
 FROZEN_PER_MAZE = 5  # episodes of a track
 
+STATE_SIZE = 12  # numbers of a state, of any body
 X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in a state, see docs/task.md
 
 ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
@@ -24,7 +25,6 @@ VELOCITIES = {"velocity": ("forward", "left", "turn"), "diff": ("forward", "turn
 PHYSICS_TIMESTEP = 0.008  # s; at 16 ms a body at top speed sinks 5 cm into a wall
 STEPS_PER_ACTION = 20  # an action repeat of 10 frames, two physics steps each
 STEP_TIME = PHYSICS_TIMESTEP * STEPS_PER_ACTION  # s, of an agent step
-TOP_SPEED = 3.2  # m/s
 
 MAX_PIXELS = 1280  # a side of a picture
 RENDERING = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # of the environments, in Gymnasium's words

@@ -1,10 +1,18 @@
-"""Mazes in which one can say by hand where a body gets to, and how far a point is from the walls of any maze."""
+"""Mazes in which one can say by hand where a body gets to, how far a point is from walls, and another body."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
 from mazebench.maps.maze import Maze, point_to_cell
+from mazebench.world.bodies import SLIDER
+
+# Wider, heavier and half as fast.
+CART = dataclasses.replace(
+    SLIDER, name="cart", radius=0.2, mass=2.0, top_speed=1.6, fastest=1.14 * 1.6, drive_force=17.0
+)
 
 
 def field(size: int) -> Maze:

@@ -13,7 +13,7 @@ from dm_env import specs
 from gymnasium.utils import env_checker
 
 from mazebench.agent import Agent, SingleAgent
-from mazebench.constants import ACTIONS, DISCRETE, TOP_SPEED
+from mazebench.constants import ACTIONS, DISCRETE
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
@@ -24,7 +24,7 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.testing import ConformanceError, check_agent
-from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, velocity_controls
+from mazebench.world.bodies import SLIDER
 
 MIDDLE = Episode(0, (20, 20), (35, 35), 0.0, 0)
 # The velocity that stands for each of the six actions.
@@ -48,20 +48,20 @@ def cruise(field: Environment, velocity, num_steps: int = 12) -> np.ndarray:
 
 class TestControls:
     def test_unit_velocities_are_the_six_actions(self):
-        np.testing.assert_array_equal(velocity_controls(UNIT_VELOCITIES), action_controls())
-        np.testing.assert_array_equal(velocity_controls(np.zeros(3)), np.zeros(5))
+        np.testing.assert_array_equal(SLIDER.velocity_controls(UNIT_VELOCITIES), SLIDER.action_controls())
+        np.testing.assert_array_equal(SLIDER.velocity_controls(np.zeros(3)), np.zeros(5))
 
     @pytest.mark.parametrize("share", [1.0, 0.75, 0.5, 0.25, -0.5, -1.0])
     def test_a_body_cruises_at_its_share_of_the_top_speed(self, field, share):
-        np.testing.assert_allclose(cruise(field, [share, 0, 0]), [share * TOP_SPEED, 0, 0], atol=1e-3)
-        np.testing.assert_allclose(cruise(field, [0, share, 0]), [0, share * TOP_SPEED, 0], atol=1e-3)
-        np.testing.assert_allclose(cruise(field, [0, 0, share]), [0, 0, share * TURN_RATE], atol=1e-3)
+        np.testing.assert_allclose(cruise(field, [share, 0, 0]), [share * SLIDER.top_speed, 0, 0], atol=1e-3)
+        np.testing.assert_allclose(cruise(field, [0, share, 0]), [0, share * SLIDER.top_speed, 0], atol=1e-3)
+        np.testing.assert_allclose(cruise(field, [0, 0, share]), [0, 0, share * SLIDER.turn_rate], atol=1e-3)
 
     def test_a_body_driving_aslant_is_no_faster(self, field):
         forward, left, _ = cruise(field, [1, 1, 0])
-        assert (forward, left) == pytest.approx((TOP_SPEED / np.sqrt(2),) * 2, abs=1e-3)
+        assert (forward, left) == pytest.approx((SLIDER.top_speed / np.sqrt(2),) * 2, abs=1e-3)
         forward, left, _ = cruise(field, [-0.3, 0.4, 0])
-        assert (forward, left) == pytest.approx((-0.3 * TOP_SPEED, 0.4 * TOP_SPEED), abs=1e-3)
+        assert (forward, left) == pytest.approx((-0.3 * SLIDER.top_speed, 0.4 * SLIDER.top_speed), abs=1e-3)
 
     def test_no_velocity_drives_a_body_into_a_wall(self):
         spec = Task.of("local", size=13, actions="velocity")
@@ -72,7 +72,7 @@ class TestControls:
                 actions = rng.uniform(-1, 1, size=(32, 3))
             _, _, _, _, info = envs.step(actions)
             for maze, position in zip(info["maze"], info["position"], strict=True):
-                assert simple_mazes.clearance(spec.mazes[maze].walls, position[None]) > BODY_RADIUS - 0.01
+                assert simple_mazes.clearance(spec.mazes[maze].walls, position[None]) > SLIDER.radius - 0.01
 
 
 class TestEnvironments:

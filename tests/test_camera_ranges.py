@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 from mazebench_agents.navigator import Navigator
 from mazebench_agents.robot.beams import add_scan, beams_of, log_likelihood
-from mazebench_agents.robot.body import TURN_STEP, Body
 from mazebench_agents.robot.camera_ranges import MAX_RANGE, NUM_RAYS, SHIPPED, SURE, CameraRanges, rays_in_view
 from mazebench_agents.robot.facing import TurningDrive
 from mazebench_agents.robot.map_matching import MapBelief
+from mazebench_agents.robot.moving_body import MovingBody
 from mazebench_agents.robot.range_training import Pictures, train
 from mazebench_agents.robot.senses import Memory
 
 from mazebench.errors import UnplayableError
 from mazebench.tasks.task import Task
 from mazebench.testing import check_agent
+from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import LOOKS, Camera
 from mazebench.world.ray_casting import LidarModel
 
@@ -76,14 +77,17 @@ def test_a_body_that_turns_drives_as_if_it_did_not():
     walls = np.ones((9, 9))
     walls[4, 1:8] = 0
     memory = Memory(
-        MapBelief(walls, np.eye(9)[[4]].T @ np.eye(9)[[6]], 1, None, 9), Body(2.5, 4.5, 3.0, 0.0, 0.0), 0.01, 1.0
+        MapBelief(walls, np.eye(9)[[4]].T @ np.eye(9)[[6]], 1, None, 9),
+        MovingBody(SLIDER, 2.5, 4.5, 3.0, 0.0, 0.0),
+        0.01,
+        1.0,
     )
     drive, path = TurningDrive(3.0), [(4, column) for column in range(2, 7)]
     forward, left, turn = drive.follow(path, walls, memory)
     assert abs(turn) == 1
-    heading = 3.0 + turn * TURN_STEP / 2
+    heading = 3.0 + turn * SLIDER.turn_step / 2
     assert forward * np.cos(heading) - left * np.sin(heading) > 0.98, "east"
-    assert memory.commanded[2] == pytest.approx(3.0 + turn * TURN_STEP)
+    assert memory.commanded[2] == pytest.approx(3.0 + turn * SLIDER.turn_step)
     assert memory.commanded[0] > 2.5
 
 

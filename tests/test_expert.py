@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from mazebench_agents.expert import Expert, labels
-from mazebench_agents.robot.body import BACKWARD, FORWARD, LOOK_LEFT
+from mazebench_agents.robot.moving_body import BACKWARD, FORWARD, LOOK_LEFT
 from simple_mazes import corridor
 
 import mazebench
@@ -14,6 +14,7 @@ from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import InputError
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.tasks.trials import Trial
+from mazebench.world.bodies import SLIDER
 
 NUM_ENVS = 8
 
@@ -49,7 +50,7 @@ def test_labels_follow_from_the_state_whoever_has_driven_to_it(task, options):
     for step in range(80):
         found, rules = labels(envs), envs.rules
         if step % 10 == 0:
-            new = Expert(envs.task.mazes, NUM_ENVS)
+            new = Expert(envs.task.mazes, NUM_ENVS, SLIDER)
             costs = new.costs(rules.maze, rules.target, rules.pose, envs.velocity())
             np.testing.assert_array_equal(found, costs.argmin(axis=1))
             np.testing.assert_array_equal(labels(envs, costs=True), costs)
@@ -61,7 +62,7 @@ def test_labels_follow_from_the_state_whoever_has_driven_to_it(task, options):
 
 
 def test_costs_are_metres_of_way():
-    expert = Expert((corridor(),), 2)
+    expert = Expert((corridor(),), 2, SLIDER)
     # At rest far from the goal, which is ahead; and in front of the goal, at 1 m/s.
     pose = np.array([[2.5, 7.5, 0.0], [6.95, 7.5, 0.0]])
     at_rest, at_goal = expert.costs(np.zeros(2, int), np.full(2, 9 + 7), pose, np.array([[0.0, 0.0], [1.0, 0.0]]))

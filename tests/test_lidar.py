@@ -20,7 +20,8 @@ from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.tasks.task import Task
-from mazebench.world.mjcf import BODY_HEIGHT, maze_spec
+from mazebench.world.bodies import SLIDER
+from mazebench.world.mjcf import maze_spec
 from mazebench.world.ray_casting import MAX_RANGE, NUM_RAYS, Lidar, ray_ends
 
 # Free are x from 1 to 3 m at y from 3 to 4 m, and below that x from 2 to 3 m down to y = 1 m.
@@ -43,7 +44,7 @@ def mujoco_ranges(maze: Maze, pose: np.ndarray) -> np.ndarray:
     for (x, y, _), angles, found in zip(pose, angles_of(pose), distances, strict=True):
         rays = np.stack([np.cos(angles), np.sin(angles), np.zeros(NUM_RAYS)], axis=1).ravel()
         geoms = np.zeros(NUM_RAYS, dtype=np.int32)
-        centre = np.array([x, y, BODY_HEIGHT / 2])
+        centre = np.array([x, y, SLIDER.height / 2])
         mujoco.mj_multiRay(model, data, centre, rays, None, True, body, geoms, found, None, NUM_RAYS, mujoco.mjMAXVAL)
     return np.minimum(distances, MAX_RANGE)
 

@@ -11,6 +11,7 @@ from mazebench_agents.robot.quickest import costs_of_actions, make_course
 from mazebench.errors import UnplayableError
 from mazebench.tasks.task import Task
 from mazebench.testing import check_agent
+from mazebench.world.bodies import SLIDER
 
 
 def test_a_cell_knows_the_goal_that_is_up_to_41_cells_away():
@@ -33,10 +34,11 @@ def test_a_turned_example_is_one_of_the_turned_maze(symmetry):
     maps, pose, velocity, _, labels = cloning._turned(example, pictures, symmetry)
 
     walls, goal = maps[0].numpy() > 0, tuple(np.argwhere(maps[1].numpy())[0].tolist())
-    course = make_course(walls, 1.0, goal)
+    course = make_course(SLIDER, walls, 1.0, goal)
     yaw, (forward, left) = pose[:, 2].numpy(), velocity.numpy().T
     on_map = np.stack([np.cos(yaw) * forward - np.sin(yaw) * left, np.sin(yaw) * forward + np.cos(yaw) * left], 1)
     costs = costs_of_actions(
+        course.motion,
         *(np.repeat(values[None], len(yaw), axis=0) for values in (course.walls, course.way_left)),
         np.full((len(yaw), 2), (course.goal_x, course.goal_y)),
         1.0, pose.numpy().astype(np.float64), on_map.astype(np.float64),

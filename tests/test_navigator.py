@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from acting import inputs_of
 from mazebench_agents.robot import planning
-from mazebench_agents.robot.body import FORWARD, Body
 from mazebench_agents.robot.driving import Drive
 from mazebench_agents.robot.map_matching import MapBelief
+from mazebench_agents.robot.moving_body import FORWARD, MovingBody
 from mazebench_agents.robot.senses import Memory
 from run_folders import records_of
 
@@ -22,6 +22,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
+from mazebench.world.bodies import SLIDER
 
 
 def ring(size: int = 7) -> np.ndarray:
@@ -59,7 +60,7 @@ class TestDriving:
     def test_a_drive_is_followed_until_the_body_is_off_it(self):
         blocked = ring() > 0.5
         path = planning.plan(ring(), goal_at((5, 5)), (1, 1))
-        drive, body = Drive(), Body(x=1.5, y=5.5, yaw=0.0, forward=0.0, left=0.0)
+        drive, body = Drive(), MovingBody(SLIDER, x=1.5, y=5.5, yaw=0.0, forward=0.0, left=0.0)
         action, (x, y) = drive.next(blocked, path, body, 1.0)
         assert action == FORWARD
         assert 1.6 < x < 2.2
@@ -136,7 +137,9 @@ class TestReferences:
         context = np.stack([shown, shown, goal_at((1, 4)), goal_at((1, 1))])
         truth = Truth(true[None] > 0.5, np.zeros((1, 3)), np.array([[1, 4]]))
         inputs = inputs_of({"context": context[None]}, np.array([True]))._replace(truth=truth)
-        memory = Memory(MapBelief(shown, goal_at((1, 4)), 1, None, 7), Body(1.5, 5.5, 0.0, 0.0, 0.0), 0.01, 1.0)
+        memory = Memory(
+            MapBelief(shown, goal_at((1, 4)), 1, None, 7), MovingBody(SLIDER, 1.5, 5.5, 0.0, 0.0, 0.0), 0.01, 1.0
+        )
         agent = load_agent_class("navigator-told").build(Interface("local", 7, 7))
         for seen, expected in ((None, shown), ((2, 3), shown), ((1, 3), true)):
             if seen:

@@ -13,6 +13,7 @@ from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError
 from mazebench.tasks.perturbations.odometry import LostPose, Odometry
 from mazebench.tasks.task import Task
+from mazebench.world.bodies import SLIDER
 
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state
 
@@ -38,13 +39,13 @@ def driven(seed: int, num_steps: int = 100) -> np.ndarray:
     env = mazebench.load(size=13, time_limit=num_steps + 1, distances=(15,), seed=seed)
     env.reset()
     rng = np.random.default_rng(seed)
-    states = [env.physics.state()]
+    states = [SLIDER.state(env.physics.data.sensordata)]
     action = 0
     while len(states) <= num_steps:
         if rng.random() < 0.5:
             action = int(rng.choice(6, p=[0.4, 0.1, 0.1, 0.1, 0.15, 0.15]))
         env.step(action)
-        states.append(env.physics.state())
+        states.append(SLIDER.state(env.physics.data.sensordata))
     return np.array(states)
 
 

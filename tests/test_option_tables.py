@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 import mazebench
-from mazebench.constants import ACTIONS, TOP_SPEED, YAW, X, Y
+from mazebench.constants import ACTIONS, YAW, X, Y
 from mazebench.options import fields_of
 from mazebench.tasks.task_options import HIERARCHICAL, LOCAL, TaskOptions
 from mazebench.tasks.tracks import TRACKS
-from mazebench.world.mjcf import TURN_RATE
+from mazebench.world.bodies import SLIDER
 
 DOCS = pathlib.Path(__file__).parent.parent / "docs"
 PAGES = [DOCS / "options.md", DOCS / "sensors.md", *sorted((DOCS / "environments").glob("[!i]*.md"))]
@@ -74,7 +74,7 @@ def with_derived_tables(page: pathlib.Path, text: str) -> str:
 def actions_table(_: str) -> str:
     rows = ["| index | action | drives or turns at | unit |", "|---|---|---|---|"]
     for index, name in enumerate(ACTIONS):
-        speed = f"{np.degrees(TURN_RATE):.0f} | degrees/s" if "look" in name else f"{TOP_SPEED:g} | m/s"
+        speed = f"{np.degrees(SLIDER.turn_rate):.0f} | degrees/s" if "look" in name else f"{SLIDER.top_speed:g} | m/s"
         rows.append(f"| {index} | {name.replace('_', ' ')} | {speed} |")
     return "\n".join(rows) + "\n"
 

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from mazebench_agents.robot.body import BACKWARD, LOOK_LEFT, LOOK_RIGHT, TURN_STEP
-from mazebench_agents.robot.motion import moved
+from mazebench_agents.robot.motion import Motion, moved
+from mazebench_agents.robot.moving_body import BACKWARD, LOOK_LEFT, LOOK_RIGHT
 from mazebench_agents.robot.quickest import make_course, quickest_drive
-from simple_mazes import corridor, field
+from simple_mazes import CART, corridor, field
 
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import NUM_ACTIONS, STEPS_PER_ACTION
@@ -18,9 +18,9 @@ from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.actions import controls_of_action
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials, frozen_trials
+from mazebench.world.bodies import SLIDER
 from mazebench.world.models import models_of
 from mazebench.world.simulation import MujocoSimulation
 
@@ -40,19 +40,20 @@ def play(agent: str, task, trials) -> list[Result]:
 
 
 class TestMotion:
+    @pytest.mark.parametrize("body", [SLIDER, CART], ids=lambda body: body.name)
     @pytest.mark.parametrize("cell_size", [1.0, 0.5])
-    def test_a_step_is_that_of_the_world_also_in_contact_with_walls(self, cell_size):
+    def test_a_step_is_that_of_the_world_also_in_contact_with_walls(self, cell_size, body):
         maze = dfs(0, cell_size=cell_size)
         walls = np.ascontiguousarray(maze.walls[::-1].T)
-        simulation = MujocoSimulation(models_of((maze,))[0])
+        simulation = MujocoSimulation(models_of((maze,), body)[0])
         rng = np.random.default_rng(1)
         action, errors = 0, []
         for _ in range(1000):
             action = int(rng.integers(NUM_ACTIONS)) if rng.random() < 0.5 else action
             (x, y), yaw, (vx, vy) = simulation.position(), simulation.yaw(), simulation.data.qvel[:2]
-            heading = yaw + TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
-            expected = moved(walls, maze.cell_size, x, y, vx, vy, heading, action)
-            simulation.set_controls(controls_of_action("six", action))
+            heading = yaw + body.turn_step * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
+            expected = moved(Motion.of(body), walls, maze.cell_size, x, y, vx, vy, heading, action)
+            simulation.set_controls(body.action_controls()[action])
             simulation.step(STEPS_PER_ACTION)
             errors.append(math.dist(expected[:2], simulation.position()))
         assert np.quantile(errors, 0.95) < 0.002
@@ -61,7 +62,7 @@ class TestMotion:
 
 class TestQuickestDrive:
     def test_a_straight_way_is_driven_straight(self):
-        course = make_course(corridor().walls, 1.0, (1, 7))
+        course = make_course(SLIDER, corridor().walls, 1.0, (1, 7))
         actions, points = quickest_drive(course, (1.5, 7.5), (0.0, 0.0), math.pi)
         # Backwards, which is as fast: 2.7 of the 5.5 m to the goal cell in 6 steps, then half a metre a step.
         assert actions[:9] == [BACKWARD] * 9
@@ -69,7 +70,7 @@ class TestQuickestDrive:
         assert points[-2][0] < 7 < points[-1][0] < 7.2  # it lets go in time, to drive no further than it must
 
     def test_a_drive_that_is_cut_short_leads_towards_the_goal(self):
-        course = make_course(field(21).walls, 1.0, (1, 19))
+        course = make_course(SLIDER, field(21).walls, 1.0, (1, 19))
         actions, points = quickest_drive(course, (1.5, 1.5), (0.0, 0.0), 0.3, num_steps=10)
         assert len(actions) == 10
         assert math.dist(points[-1], (19.5, 19.5)) < math.dist((1.5, 1.5), (19.5, 19.5)) - 3

@@ -28,7 +28,7 @@ from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
-from mazebench.world.mjcf import action_controls
+from mazebench.world.bodies import SLIDER
 from mazebench.world.models import models_of
 from mazebench.world.simulation import MujocoSimulation
 
@@ -62,12 +62,12 @@ class TestScale:
         maze = dfs()
         paths = []
         for each in (maze, doubled(maze)):
-            simulation = MujocoSimulation(models_of((each,))[0])
+            simulation = MujocoSimulation(models_of((each,), SLIDER)[0])
             with simulation.reset_context():
                 simulation.place_agent(maze.point(maze.free_cells[0]), 0.3)
             path = []
             for action in (0, 0, 0, 4, 4, 0, 0, 2, 2, 1, 0, 0, 0, 5, 0, 0):
-                simulation.set_controls(action_controls()[action])
+                simulation.set_controls(SLIDER.action_controls()[action])
                 simulation.step(STEPS_PER_ACTION)
                 path.append(simulation.position())
             paths.append(path)

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mazebench_agents.robot import rays
-from mazebench_agents.robot.body import Body
 from mazebench_agents.robot.cells import nearest_cell
 from mazebench_agents.robot.dead_reckoning import DeadReckoning
+from mazebench_agents.robot.moving_body import MovingBody
 from mazebench_agents.robot.planning import cheapest_ways
 
 from mazebench.constants import STEP_TIME
+from mazebench.world.bodies import SLIDER
 
 
 @settings(deadline=None)  # of the compilation
@@ -42,8 +43,8 @@ def test_cells_without_a_way_stay_where_they_are():
     assert cheapest_ways(np.full((2, 2), np.inf), end).tolist() == [0, 1, 2, 3]
 
 
-def body(x: float, forward: float) -> Body:
-    return Body(x=x, y=0.0, yaw=0.0, forward=forward, left=0.0)
+def body(x: float, forward: float) -> MovingBody:
+    return MovingBody(SLIDER, x=x, y=0.0, yaw=0.0, forward=forward, left=0.0)
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(0.0, 1 + 3 * STEP_TIME), (1.0, 7.0)])

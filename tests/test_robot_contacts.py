@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mazebench_agents.robot.body import FORWARD, LOOK_LEFT, TURN_STEP, Body
 from mazebench_agents.robot.contacts import felt_walls
-from mazebench_agents.robot.motion import moved
+from mazebench_agents.robot.motion import Motion, moved
+from mazebench_agents.robot.moving_body import FORWARD, LOOK_LEFT, MovingBody
 from mazebench_agents.robot.occupancy import SURE
 from simple_mazes import field
 
@@ -17,20 +17,21 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds.obstacles import obstacles_walls
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
+from mazebench.world.bodies import SLIDER
 
 
-def step(walls: np.ndarray, body: Body, action: int) -> Body:
+def step(walls: np.ndarray, body: MovingBody, action: int) -> MovingBody:
     """The body after one action, by the model of its motion; walls are [row, column], a cell is a metre."""
     by_point = np.ascontiguousarray(walls[::-1].T)
-    x, y, vx, vy = moved(by_point, 1.0, body.x, body.y, *body.velocity(), body.yaw, action)
-    yaw = body.yaw + TURN_STEP * (action == LOOK_LEFT)
+    x, y, vx, vy = moved(Motion.of(SLIDER), by_point, 1.0, body.x, body.y, *body.velocity(), body.yaw, action)
+    yaw = body.yaw + SLIDER.turn_step * (action == LOOK_LEFT)
     cosine, sine = np.cos(yaw), np.sin(yaw)
-    return Body(x, y, yaw, cosine * vx + sine * vy, cosine * vy - sine * vx)
+    return MovingBody(SLIDER, x, y, yaw, cosine * vx + sine * vy, cosine * vy - sine * vx)
 
 
 def test_a_wall_that_the_body_drives_against_is_felt():
     walls = field(7).walls
-    body, felt = Body(x=4.5, y=3.5, yaw=0.0, forward=0.0, left=0.0), []
+    body, felt = MovingBody(SLIDER, x=4.5, y=3.5, yaw=0.0, forward=0.0, left=0.0), []
     for _ in range(8):
         before, body = body, step(walls, body, FORWARD)
         felt += felt_walls(before, FORWARD, body, 1.0, 0.01, 7)
@@ -38,15 +39,15 @@ def test_a_wall_that_the_body_drives_against_is_felt():
 
 
 def test_nothing_is_felt_in_the_open():
-    body = Body(x=3.5, y=3.5, yaw=0.3, forward=0.0, left=0.0)
+    body = MovingBody(SLIDER, x=3.5, y=3.5, yaw=0.3, forward=0.0, left=0.0)
     after = step(field(7).walls, body, FORWARD)
     assert felt_walls(body, FORWARD, after, 1.0, 0.01, 7) == []
 
 
 def test_a_corner_that_stops_the_body_is_no_wall_ahead():
     # Above the body is a free cell, and above on its left a wall, whose corner it hangs on.
-    before = Body(x=5.157, y=7.821, yaw=2.06, forward=-0.14, left=-0.26)
-    after = Body(x=5.178, y=7.989, yaw=2.06, forward=1.37, left=-1.00)
+    before = MovingBody(SLIDER, x=5.157, y=7.821, yaw=2.06, forward=-0.14, left=-0.26)
+    after = MovingBody(SLIDER, x=5.178, y=7.989, yaw=2.06, forward=1.37, left=-1.00)
     assert (4, 5) not in {cell for cell, _ in felt_walls(before, FORWARD, after, 1.0, 0.01, 13)}
 
 
@@ -55,7 +56,7 @@ def test_what_is_felt_on_random_drives_are_walls():
     for _ in range(20):
         walls = obstacles_walls(9, rng)
         row, column = rng.choice(np.argwhere(~walls))
-        body = Body(x=column + 0.5, y=9 - row - 0.5, yaw=rng.uniform(-3, 3), forward=0.0, left=0.0)
+        body = MovingBody(SLIDER, x=column + 0.5, y=9 - row - 0.5, yaw=rng.uniform(-3, 3), forward=0.0, left=0.0)
         for _ in range(100):
             action = int(rng.integers(6))
             before, body = body, step(walls, body, action)

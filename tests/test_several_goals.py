@@ -25,6 +25,7 @@ from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.trials import frozen_trials, select_trials
+from mazebench.world.bodies import SLIDER
 
 NEAR = {"task": "building", "mazes": field(9), "distances": (3, 4), "episodes_per_distance": 4, "num_goals": 3}
 
@@ -65,7 +66,7 @@ class TestGoals:
             return rules.info(0)
 
         def limit(start, goal):
-            return default_time_limit(maze.distance(start, goal), 1.0, track="rebuilt")
+            return default_time_limit(maze.distance(start, goal), 1.0, SLIDER, track="rebuilt")
 
         # The first goal is reached, the second one is missed: the time runs out in the first goal's cell.
         info = step(first)

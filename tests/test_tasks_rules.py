@@ -11,6 +11,7 @@ from mazebench.tasks.rules import Rules, reward
 from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import default_time_limit
+from mazebench.world.bodies import SLIDER
 
 ROW = 1  # of the corridor, whose cells are (1, 1) to (1, 7)
 everywhere = pytest.mark.parametrize("num_envs", [1, 3])
@@ -158,7 +159,7 @@ class TestInfosOfTheTask:
             blocked = is_blocked(maze.walls, show_map(task, episode).walls, (episode.start, episode.goal))
             level, distance = episode_level(task, episode), maze.distance(episode.start, episode.goal)
             expected = {"track": track, "level": level, "kind": maze.kind, "distance": distance, "blocked": blocked}
-            expected |= {"way_left": distance, "time_limit": default_time_limit(distance, 1.0, track=track)}
+            expected |= {"way_left": distance, "time_limit": default_time_limit(distance, 1.0, SLIDER, track=track)}
             assert {name: info[name] for name in expected} == expected
             seen.add((level, blocked))
         assert len({level for level, _ in seen}) == 3

@@ -33,6 +33,7 @@ from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.tasks.trials import frozen_trials
+from mazebench.world.bodies import SLIDER
 from mazebench.world.ray_casting import TURTLEBOT3
 from tests.simple_mazes import field
 
@@ -88,7 +89,7 @@ def test_the_task_of_a_level(track, level):
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.interface.odometry_noise == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
-    assert default_time_limit(20, 1.0, track=track) == (270 if is_lost else 170)
+    assert default_time_limit(20, 1.0, SLIDER, track=track) == (270 if is_lost else 170)
     env = mazebench.load(track, level=level, seed=0)
     state = env.reset().observation["state"]
     assert (state[[0, 1, 5]] == 0).all() == is_lost

@@ -11,14 +11,14 @@ from simple_mazes import clearance
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, point_to_cell
-from mazebench.world.mjcf import BODY_RADIUS, action_controls
+from mazebench.world.bodies import SLIDER
 from mazebench.world.models import MazeModels
 from mazebench.world.near_walls import NearWalls, WallGeoms
 from mazebench.world.simulation import MujocoSimulation
 
 STEPS_PER_FRAME = 2
 FRAMES_PER_ACTION = 10
-CONTROLS = action_controls()
+CONTROLS = SLIDER.action_controls()
 DRIVES = ("forward", "backward", "strafe_left", "strafe_right")
 # Where a drive leads, as an angle from the heading.
 BEARINGS = {"forward": 0, "backward": np.pi, "strafe_left": np.pi / 2, "strafe_right": -np.pi / 2}
@@ -45,7 +45,7 @@ MIDDLE = np.array([12.5, 12.5])
 
 
 def simulation_at(maze: Maze, position, yaw: float = 0.0, velocity=(0.0, 0.0)) -> MujocoSimulation:
-    simulation = MujocoSimulation(MazeModels([maze])[0])
+    simulation = MujocoSimulation(MazeModels([maze], SLIDER)[0])
     with simulation.reset_context():
         simulation.place_agent(np.asarray(position), yaw)
         simulation.data.qvel[:2] = velocity
@@ -143,15 +143,15 @@ class TestWalls:
         angle, offset = (grid.ravel() for grid in np.meshgrid(angles, offsets))
         ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         aside = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
-        batch = mujoco.batch.Batch(MazeModels([maze])[0], len(angle), 0)
+        batch = mujoco.batch.Batch(MazeModels([maze], SLIDER)[0], len(angle), 0)
         qpos, qvel, ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
         for action in ("forward", "look_left"):  # driving on and coasting
             qpos[:] = np.c_[np.array([5.5, 5.5]) - 1.5 * ahead + offset[:, None] * aside, angle]
             qvel[:] = np.c_[LAB_TOP_SPEED * ahead, np.zeros(len(angle))]
-            ctrl[:] = action_controls()[ACTIONS.index(action)]
+            ctrl[:] = SLIDER.action_controls()[ACTIONS.index(action)]
             for _ in range(150):
                 batch.step(None, nstep=1)
-                assert clearance(maze.walls, qpos[:, :2]).min() >= BODY_RADIUS - 0.01
+                assert clearance(maze.walls, qpos[:, :2]).min() >= SLIDER.radius - 0.01
 
     @pytest.mark.parametrize(("kind", "size"), [("dfs", 13), ("rooms", 15), ("obstacles", 11)])
     def test_body_when_acting_at_random_for_thousands_of_steps(self, kind, size):
@@ -160,7 +160,7 @@ class TestWalls:
         mazes = [generate(kind, size, rng) for _ in range(num_mazes)]
         num_bodies = 8 * num_mazes
         maze_of_body = np.arange(num_bodies) % num_mazes
-        walls = NearWalls(tuple(mazes), num_mazes)
+        walls = NearWalls(tuple(mazes), num_mazes, SLIDER)
         batch = mujoco.batch.Batch(walls.model, num_bodies, 0)
         geoms = WallGeoms.of_batch(batch)
         qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
@@ -175,7 +175,7 @@ class TestWalls:
                 # Persistent, or the bodies would hardly leave their cells.
                 changed = rng.random(num_bodies) < 0.3
                 actions = np.where(changed, rng.integers(len(ACTIONS), size=num_bodies), actions)
-                ctrl[:] = action_controls()[actions]
+                ctrl[:] = SLIDER.action_controls()[actions]
                 walls.write(geoms, np.arange(num_bodies), maze_of_body, mazes[0].cell_index(qpos[:, :2]))
             batch.step(None, nstep=1)
             visited[step] = qpos[:, :2]
@@ -186,4 +186,4 @@ class TestWalls:
             row, column = point_to_cell(points, size).T
             assert not maze.walls[row, column].any()
             nearest = clearance(maze.walls, points).min()
-            assert BODY_RADIUS - 0.01 <= nearest < BODY_RADIUS + 0.1  # walls were met
+            assert SLIDER.radius - 0.01 <= nearest < SLIDER.radius + 0.1  # walls were met

@@ -12,6 +12,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.world import mjcf, models
+from mazebench.world.bodies import SLIDER
 from mazebench.world.export import write_mjcf
 
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "maze-5.xml"
@@ -24,7 +25,7 @@ def golden_maze() -> Maze:
 class TestMazeModels:
     def test_models_that_were_used_last_are_kept(self, monkeypatch):
         monkeypatch.setattr(models, "_MOST_GEOMS", 20)
-        whole = models.MazeModels([golden_maze(), generate("dfs", 13, np.random.default_rng(0)), golden_maze()])
+        whole = models.MazeModels([golden_maze(), generate("dfs", 13, np.random.default_rng(0)), golden_maze()], SLIDER)
         first, second = whole[0], whole[1]
         assert whole[1] is second
         whole[2]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simple_mazes import CART
 
-from mazebench.constants import ACTIONS, STEP_TIME, STEPS_PER_ACTION, TOP_SPEED
+from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.doors import swap_doors
 from mazebench.maps.drawn import FreshMazes
@@ -13,11 +14,10 @@ from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import MAX_SIZE, Maze, resized
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
-from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, action_controls, maze_spec, velocity_controls
-from mazebench.world.near_walls import _REACH, NearWalls, WallGeoms
+from mazebench.world.bodies import SLIDER, Body
+from mazebench.world.mjcf import maze_spec
+from mazebench.world.near_walls import NearWalls, WallGeoms
 from mazebench.world.simulation import MujocoSimulation
-
-CONTROLS = action_controls()
 
 
 def maze_of(kind: str, size: int = 21, cell_size: float = 1.0) -> Maze:
@@ -31,24 +31,26 @@ def rebuilt() -> Maze:
     return Maze(swap_doors(house.walls, house.kind, 2, ends, np.random.default_rng(0)), "rebuilt")
 
 
-def drive(maze: Maze, num_steps: int, held: float, seed: int = 0, is_continuous: bool = False) -> tuple[int, float]:
+def drive(
+    maze: Maze, num_steps: int, held: float, seed: int = 0, is_continuous: bool = False, body: Body = SLIDER
+) -> tuple[int, float]:
     """Drives at random in the whole maze and near its walls; returns the contacts and the top speed there were.
 
     An action, one of six or velocities, is held on with the probability `held` in each of the steps.
     """
-    walls = NearWalls((maze,), 1)
-    whole, near = MujocoSimulation(maze_spec(maze).compile()), MujocoSimulation(walls.model, walls)
+    walls, of_actions = NearWalls((maze,), 1, body), body.action_controls()
+    whole, near = MujocoSimulation(maze_spec(maze, body=body).compile()), MujocoSimulation(walls.model, walls)
     rng = np.random.default_rng(seed)
     start = maze.free_cells[rng.integers(len(maze.free_cells))]
     near.surround(0, int(start @ (maze.size, 1)))
     for simulation in (whole, near):
         with simulation.reset_context():
             simulation.place_agent(maze.point(start), 0.3)
-    controls, contacts, fastest = CONTROLS[0], 0, 0.0
+    controls, contacts, fastest = of_actions[0], 0, 0.0
     for _ in range(num_steps):
         if rng.random() >= held:
             action = int(rng.integers(len(ACTIONS)))
-            controls = velocity_controls(rng.uniform(-1, 1, 3)) if is_continuous else CONTROLS[action]
+            controls = body.velocity_controls(rng.uniform(-1, 1, 3)) if is_continuous else of_actions[action]
         row, column = maze.cell_at(*near.position())
         near.surround(0, row * maze.size + column)
         for simulation in (whole, near):
@@ -65,7 +67,7 @@ class TestBits:
     def test_a_body_moves_as_in_the_whole_maze(self, kind):
         contacts, fastest = drive(maze_of(kind), 300, held=0.8)
         assert contacts > 100
-        assert fastest > TOP_SPEED
+        assert fastest > SLIDER.top_speed
 
     @pytest.mark.parametrize("cell_size", [0.4, 0.75])
     def test_in_narrow_cells_of_caves_too(self, cell_size):
@@ -75,17 +77,21 @@ class TestBits:
     def test_when_velocities_are_set(self, cell_size):
         assert drive(maze_of("dfs", cell_size=cell_size), 400, held=0.8, is_continuous=True)[0] > 100
 
+    def test_of_a_wider_and_slower_body_too(self):
+        contacts, fastest = drive(maze_of("dfs"), 300, held=0.8, body=CART)
+        assert contacts > 100
+        assert CART.top_speed < fastest < CART.fastest
+
     def test_where_doors_have_moved(self):
         assert drive(rebuilt(), 300, held=0.8)[0] > 100
 
     def test_when_cells_are_entered_at_top_speed(self):
         contacts, fastest = drive(maze_of("dfs", 31), 600, held=0.95)
         assert contacts > 100
-        assert fastest > 0.99 * TOP_SPEED
+        assert fastest > 0.99 * SLIDER.top_speed
 
-    def test_all_that_a_body_can_touch_in_a_step_is_in_reach(self):
-        # No two drives give more than 3.643 m/s (the module's comment).
-        assert _REACH >= BODY_RADIUS + CONTACT_MARGIN + 3.643 * STEP_TIME
+    def test_the_body_is_never_faster_than_it_says(self):
+        assert SLIDER.fastest >= 3.643  # m/s, which no two drives exceed (the comment in its file)
 
 
 class TestBoxes:
@@ -93,7 +99,7 @@ class TestBoxes:
     def test_those_within_reach_of_a_cell_are_there_in_order(self, cell_size, reach):
         maze = maze_of("obstacles", 15, cell_size)
         whole = maze_spec(maze).compile()
-        walls = NearWalls((maze,), 1)
+        walls = NearWalls((maze,), 1, SLIDER)
         geoms = WallGeoms.of_model(walls.model)
         for row, column in maze.free_cells[::7].tolist():
             walls.write_one(geoms, 0, row * maze.size + column)
@@ -110,7 +116,7 @@ class TestBoxes:
     @pytest.mark.parametrize("num_others", [1, 7])  # the boxes of a few bodies are looked up one by one
     def test_environments_may_be_in_different_fresh_mazes(self, num_others):
         mazes = FreshMazes(("dfs", "house"), 13)
-        walls, alone = NearWalls(mazes, 10), NearWalls((mazes[9],), 1)
+        walls, alone = NearWalls(mazes, 10, SLIDER), NearWalls((mazes[9],), 1, SLIDER)
         expected = WallGeoms.of_model(alone.model)
         geoms = WallGeoms(*(np.zeros((10, *each.shape[1:])) for each in expected))
         cell = int(mazes[9].free_cells[4] @ (13, 1))

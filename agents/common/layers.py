@@ -13,12 +13,13 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from mazebench.constants import TOP_SPEED
+from mazebench.world.bodies import SLIDER
 
 NUM_PLANES = 4
 NUM_WAVES = 16
 _FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre, octaves
 PERIODS = (24.0, 12.0, 6.0, 4.0, 3.0, 2.0, 1.0)  # cells, of the waves that code a position
+VELOCITY_UNIT = SLIDER.top_speed  # m/s, with which the shipped checkpoints learned
 DISPLACEMENT_UNIT = 5.0  # m, of displacements among the inputs of a network
 WAY_UNIT = 10.0  # cells, of ways to the goal
 VALUE_UNIT = 10.0  # steps, of action values; outputs of order one then span the values that matter
@@ -132,7 +133,7 @@ def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
             state[..., :2] - origin,
             torch.sin(yaw)[..., None],
             torch.cos(yaw)[..., None],
-            state[..., 6:8] / TOP_SPEED,
+            state[..., 6:8] / VELOCITY_UNIT,
             state[..., 11:12] / 2.3,
             (state[..., :2] - origin) / DISPLACEMENT_UNIT,
         ],

@@ -16,11 +16,10 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from torch import nn
 
-from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, YAW, YAW_RATE, X, Y
+from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, STATE_SIZE, YAW, YAW_RATE, X, Y
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
-from mazebench.world.simulation import STATE_SIZE
 
 from ..neural_planner.network import NUM_RANGES, REACH, CostPlanner, Situation, motion_features
 from ..neural_planner.neural_planner_config import NeuralPlannerConfig

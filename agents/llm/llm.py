@@ -16,10 +16,10 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 
-from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.cells import marked_cell
 from ..robot.driving import Drive
 from ..robot.map_matching import orientations
+from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.occupancy import SURE
 from ..robot.senses import Memory, Senses, report
 from .answers import Answers

@@ -18,6 +18,7 @@ from torch.nn import functional
 from mazebench.constants import NUM_ACTIONS
 from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.task import Task
+from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import LOOKS, PLAIN, VARIED, Camera, exposures_of
 from mazebench.world.ray_camera import RayCamera
 
@@ -25,9 +26,9 @@ from ..common.actor import one_torch_thread
 from ..common.checkpoint import save_checkpoint
 from ..common.descent import Descent, cosine
 from ..common.symmetry import NUM_SYMMETRIES, turn_actions, turn_planes
-from ..robot.body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP
 from ..robot.cells import marked_cell
 from ..robot.motion import moved
+from ..robot.moving_body import LOOK_LEFT, LOOK_RIGHT
 from ..robot.quickest import costs_of_actions, make_course
 from .map_policy import NAME
 from .network import MapNetwork
@@ -93,7 +94,7 @@ class Examples:
 
     def _example(self, number: int, walls: np.ndarray, cells: np.ndarray, goal: np.ndarray) -> Example:
         """Returns states of drives that begin near and far, with random actions among the oracle's."""
-        rng, course = self._rng, make_course(walls, 1.0, (int(goal[0]), int(goal[1])))
+        rng, course = self._rng, make_course(SLIDER, walls, 1.0, (int(goal[0]), int(goal[1])))
         side = len(course.way_left) // len(walls)
         distance = course.way_left[side // 2 :: side, side // 2 :: side][cells[:, 1], len(walls) - 1 - cells[:, 0]]
         farthest = min(_FARTHEST, distance[np.isfinite(distance)].max())
@@ -107,14 +108,14 @@ class Examples:
         goals = np.full((_DRIVES, 2), (course.goal_x, course.goal_y))
         states = []
         for _ in range(_STEPS):
-            costs = costs_of_actions(*same, goals, 1.0, pose, velocity)
+            costs = costs_of_actions(course.motion, *same, goals, 1.0, pose, velocity)
             states.append((pose.copy(), velocity.copy(), costs))
             is_random = rng.random(_DRIVES) < _RANDOM
             actions = np.where(is_random, rng.integers(NUM_ACTIONS, size=_DRIVES), costs.argmin(axis=1))
-            pose[:, 2] += TURN_STEP * ((actions == LOOK_LEFT) * 1.0 - (actions == LOOK_RIGHT))
+            pose[:, 2] += SLIDER.turn_step * ((actions == LOOK_LEFT) * 1.0 - (actions == LOOK_RIGHT))
             for drive, action in enumerate(actions.tolist()):
                 x, y, yaw = pose[drive].tolist()
-                x, y, *after = moved(course.walls, 1.0, x, y, *velocity[drive].tolist(), yaw, action)
+                x, y, *after = moved(course.motion, course.walls, 1.0, x, y, *velocity[drive].tolist(), yaw, action)
                 pose[drive, :2], velocity[drive] = (x, y), after
         map_planes = np.zeros((2, *walls.shape), np.float32)
         map_planes[0], map_planes[1, goal[0], goal[1]] = walls, 1

@@ -10,9 +10,9 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from mazebench.constants import NUM_ACTIONS, TOP_SPEED
+from mazebench.constants import NUM_ACTIONS
 
-from ..common.layers import ring_points, without_exposure
+from ..common.layers import VELOCITY_UNIT, ring_points, without_exposure
 
 _CHANNELS = 16
 _STEPS = 40  # of reading; what a cell knows travels a cell a step
@@ -70,5 +70,5 @@ class MapNetwork(nn.Module):
         colors = functional.avg_pool2d(pictures.flatten(0, 1).movedim(-1, 1) / 255, 2)
         seen = self.eye(without_exposure(colors)).unflatten(0, pose.shape[:2])
         speed = torch.linalg.vector_norm(velocity, dim=-1, keepdim=True)
-        motion = torch.cat([velocity, speed], dim=-1) / TOP_SPEED
+        motion = torch.cat([velocity, speed], dim=-1) / VELOCITY_UNIT
         return self.policy(torch.cat([near.movedim(1, 2).flatten(2), seen, motion], dim=-1))

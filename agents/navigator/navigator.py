@@ -10,9 +10,9 @@ import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface, Report
 
-from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
 from ..robot.facing import TurningDrive
+from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, report
 

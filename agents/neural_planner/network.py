@@ -12,9 +12,9 @@ import numpy as np
 import torch
 from torch import nn
 
-from mazebench.constants import NUM_ACTIONS, TOP_SPEED
+from mazebench.constants import NUM_ACTIONS
 
-from ..common.layers import ring_points
+from ..common.layers import VELOCITY_UNIT, ring_points
 from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
 from ..robot.beams import MOST_EVIDENCE
 
@@ -160,4 +160,4 @@ def motion_features(velocity: np.ndarray, actions: np.ndarray) -> np.ndarray:
       actions: `[K, 2]` int, the last one and the one before, -1 for none.
     """
     one_hots = actions[..., None] == np.arange(NUM_ACTIONS)
-    return np.concatenate([velocity / TOP_SPEED, one_hots.reshape(len(actions), -1)], axis=1).astype(np.float32)
+    return np.concatenate([velocity / VELOCITY_UNIT, one_hots.reshape(len(actions), -1)], axis=1).astype(np.float32)

@@ -18,7 +18,7 @@ from mazebench.constants import NUM_ACTIONS, YAW_RATE
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches
-from ..robot.motion import moved_in_the_open
+from ..robot.motion import Motion, moved_in_the_open
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses, report
 from .network import NUM_RANGES, REACH, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
@@ -117,7 +117,7 @@ class NeuralPlanner(NetworkAgent):
         for robot, slot, action in zip(robots, slots, chosen.tolist(), strict=True):
             body = robot.memory.body
             vx, vy = (self._cell_size * speed for speed in body.velocity())
-            x, y, _, _ = moved_in_the_open(vx, vy, body.yaw, action)
+            x, y, _, _ = moved_in_the_open(Motion.of(body.model), vx, vy, body.yaw, action)
             robot.memory.command(action, (body.x + x / self._cell_size, body.y + y / self._cell_size))
             robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1
             actions[slot] = action

@@ -73,7 +73,7 @@ class PlannerLearner(NetworkLearner):
         )
         super().__init__(actor, seed, descent)
         self._steps: list[_Step] = []  # of the rollout that is under way, oldest first
-        self._expert = Expert(task.mazes, config.num_envs)
+        self._expert = Expert(task.mazes, config.num_envs, task.body)
         self._kept: list[dict[int, Rows]] = []  # the last rollouts, by the size of grids
 
     @property

@@ -10,9 +10,9 @@ from mazebench.agent import Inputs
 from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.context import GLOBAL_MAP
 
-from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind, observed_body
 from ..robot.cells import nearest_cell, start_cell
 from ..robot.dead_reckoning import DeadReckoning
+from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind, observed_body
 from ..robot.pilot import Pilot
 from .planner import MapPlanner, plan
 
@@ -44,7 +44,7 @@ class ClosedLoopPlanner(MapPlanner):
         size = contexts.shape[-1]
         actions = np.zeros(len(state), dtype=np.int64)
         for slot, values in enumerate(inputs.observation["state"].tolist()):
-            observed, drive = observed_body(values, self._cells_per_metre), state[slot]
+            observed, drive = observed_body(self._body, values, self._cells_per_metre), state[slot]
             start = start_cell(contexts[slot])
             if drive is None or inputs.new_episode[slot]:
                 # An episode begins in the centre of the start cell.

@@ -10,9 +10,10 @@ from typing import Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
+from mazebench.world.bodies import SLIDER, Body
 
-from ..robot.body import Point
 from ..robot.motion import moved
+from ..robot.moving_body import Point
 from ..robot.quickest import Course, make_course, quickest_drive
 
 _MAX_OFF = 0.1  # m from where the drive should be, before it is planned anew
@@ -34,13 +35,13 @@ class Oracle(Agent):
 
     needs_truth = True
 
-    def __init__(self, cell_size: float = 1.0):
-        self._cell_size = cell_size
+    def __init__(self, cell_size: float = 1.0, body: Body = SLIDER):
+        self._cell_size, self._body = cell_size, body
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns an oracle for the width of the mazes' cells."""
-        return cls(interface.cell_size)
+        """Returns an oracle for the width of the mazes' cells and the body."""
+        return cls(interface.cell_size, interface.body)
 
     def initial_state(self, batch_size: int) -> list[_Drive | None]:
         """Returns nothing yet: a drive begins with an episode."""
@@ -60,7 +61,7 @@ class Oracle(Agent):
             if drive is None or inputs.new_episode[slot] or goal != drive.goal:
                 # To a goal that follows another one, the drive goes on at the speed that it has.
                 velocity = (0.0, 0.0) if drive is None or inputs.new_episode[slot] else drive.velocity
-                course = make_course(truth.walls[slot], self._cell_size, goal)
+                course = make_course(self._body, truth.walls[slot], self._cell_size, goal)
                 drive = state[slot] = _Drive(goal, course, velocity=velocity)
             if not drive.actions or math.dist(drive.points[0], (x, y)) > _MAX_OFF:
                 drive.actions, points = quickest_drive(drive.course, (x, y), drive.velocity, yaw)
@@ -68,6 +69,7 @@ class Oracle(Agent):
             actions[slot] = action = drive.actions.pop(0)
             drive.points.pop(0)
             # Computed, and not observed: what is observed may be wrong.
-            *_, vx, vy = moved(drive.course.walls, self._cell_size, x, y, *drive.velocity, yaw, action)
+            motion, walls = drive.course.motion, drive.course.walls
+            *_, vx, vy = moved(motion, walls, self._cell_size, x, y, *drive.velocity, yaw, action)
             drive.velocity = vx, vy
         return actions, state

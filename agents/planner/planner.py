@@ -18,9 +18,10 @@ from mazebench.agent import Agent, Inputs, Interface
 from mazebench.maps.maze import Cell, cell_to_point, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
 from mazebench.world.angles import wrap_angle
+from mazebench.world.bodies import SLIDER, Body
 
-from ..robot.body import FORWARD, LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, observed_body
 from ..robot.cells import marked_cell, nearest_cell, start_cell
+from ..robot.moving_body import FORWARD, LOOK_LEFT, LOOK_RIGHT, MovingBody, observed_body
 
 
 class MapPlanner(Agent):
@@ -28,14 +29,15 @@ class MapPlanner(Agent):
 
     needs_shown = ("map", "goal")
 
-    def __init__(self, cells_per_metre: float = 1.0, kind: str = "six"):
+    def __init__(self, cells_per_metre: float = 1.0, kind: str = "six", body: Body = SLIDER):
         self._cells_per_metre = cells_per_metre  # of the map that the context shows
-        self._kind = kind  # of actions
+        self._kind, self._body = kind, body  # the kind of the actions, and what they move
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
         """Returns a planner for the scale of the map, which follows from M, N and the size of a cell."""
-        return cls(interface.context_size / (interface.size * interface.cell_size), interface.actions)
+        scale = interface.context_size / (interface.size * interface.cell_size)
+        return cls(scale, interface.actions, interface.body)
 
     @classmethod
     def context_size(cls, size: int) -> int:
@@ -61,13 +63,13 @@ class _Plan:
         """The cell it drives to; on a warped map the path may be a single cell."""
         return self.path[min(self.next, len(self.path) - 1)]
 
-    def aim(self, body: Body, size: int) -> None:
+    def aim(self, body: MovingBody, size: int) -> None:
         """Sets the turns that point the body at the target from where it will come to rest."""
         (target_x, target_y), (x, y) = cell_to_point(self.target, size), body.rest()
         bearing = math.atan2(target_y - y, target_x - x)
-        self.turns = round(wrap_angle(bearing - body.yaw) / TURN_STEP)
+        self.turns = round(wrap_angle(bearing - body.yaw) / body.model.turn_step)
 
-    def action(self, body: Body, size: int) -> int:
+    def action(self, body: MovingBody, size: int) -> int:
         """Turns as aimed, drives until the observed position is in the target, then aims at the next cell."""
         arrived = not self.turns and nearest_cell(body.x, body.y, size) == self.target
         if arrived and self.next < len(self.path) - 1:
@@ -92,7 +94,7 @@ class Planner(MapPlanner):
         contexts = inputs.observation["context"]
         size = contexts.shape[-1]
         states = inputs.observation["state"].tolist()
-        bodies = [observed_body(values, self._cells_per_metre) for values in states]
+        bodies = [observed_body(self._body, values, self._cells_per_metre) for values in states]
         for slot in np.flatnonzero(inputs.new_context):
             state[slot] = _Plan(plan(contexts[slot], start_cell(contexts[slot])))
             state[slot].aim(bodies[slot], size)

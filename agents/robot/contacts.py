@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from mazebench.maps.maze import Cell
 
-from .body import Body
-from .motion import REACH, moved_in_the_open
+from .motion import Motion, moved_in_the_open
+from .moving_body import MovingBody
 
 _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in the open, if a wall stopped it
 _SLACK = 0.04  # m from which a wall pushes more than the model says, for errors of both
@@ -18,7 +18,7 @@ _SURELY, _PERHAPS = 4.0, 1.0  # log odds of a wall: where no other one can have 
 
 
 def felt_walls(
-    before: Body, action: int, after: Body, cell_size: float, deviation: float, size: int
+    before: MovingBody, action: int, after: MovingBody, cell_size: float, deviation: float, size: int
 ) -> list[tuple[Cell, float]]:
     """Returns the cells beside the body that may have stopped it in a step, none in most steps, and their log odds.
 
@@ -26,7 +26,7 @@ def felt_walls(
     `size` is L.
     """
     vx, vy = (cell_size * speed for speed in before.velocity())
-    _, _, *free = moved_in_the_open(vx, vy, before.yaw, action)
+    _, _, *free = moved_in_the_open(Motion.of(before.model), vx, vy, before.yaw, action)
     column, level = int(after.x), int(after.y)
     off_middle = after.x - column - 0.5, after.y - level - 0.5
     off_before = before.x - column - 0.5, before.y - level - 0.5
@@ -37,7 +37,7 @@ def felt_walls(
         gap = cell_size * (0.5 - sign * off_middle[axis])
         # Beside an edge of its cell, then or before, the corner of another wall may have stopped it.
         off_aside = max(abs(off_middle[1 - axis]), abs(off_before[1 - axis]))
-        is_near = -_GIVE - deviation < gap - REACH < _SLACK + deviation
+        is_near = -_GIVE - deviation < gap - before.model.reach < _SLACK + deviation
         if is_slow and off_aside < 0.5 and is_near:
             row = size - 1 - level - (sign if axis == 1 else 0)
             cell = row, column + (sign if axis == 0 else 0)

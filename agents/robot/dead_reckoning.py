@@ -6,7 +6,7 @@ import dataclasses
 
 from mazebench.constants import STEP_TIME
 
-from .body import Body, Point
+from .moving_body import MovingBody, Point
 
 
 @dataclasses.dataclass
@@ -17,7 +17,7 @@ class DeadReckoning:
     velocity: Point  # cells a second, at the last observation
     gain: float = 0.0  # weight of an observed position against the predicted one; 0 where it tells nothing
 
-    def update(self, observed: Body) -> Body:
+    def update(self, observed: MovingBody) -> MovingBody:
         """Takes in the body as it is observed one step on; returns it at the estimated position."""
         (x, y), (x_tm1, y_tm1), (x_t, y_t) = self.position, self.velocity, observed.velocity()
         # In a step, a body moves as far as at the mean of the velocities before and after.

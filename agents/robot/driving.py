@@ -11,10 +11,9 @@ import math
 
 import numpy as np
 
-from mazebench.constants import TOP_SPEED
 from mazebench.maps.maze import Cell, cell_to_point
 
-from .body import LOOK_LEFT, Body, Point
+from .moving_body import LOOK_LEFT, MovingBody, Point
 from .pilot import steer
 from .quickest import make_course, quickest_drive
 from .senses import Memory
@@ -25,7 +24,7 @@ _STEPS_AHEAD_TURNING = 11  # if the body can't strafe: a quarter turn takes 4 or
 _STEPS_USED = 4  # of them
 _WIDTH = 4  # of the beam, for each heading
 _INSIDE = 0.05  # share of a cell, from the edges of the one that the body is in
-_FASTEST = 1.1 * TOP_SPEED  # m/s; more is an error of the observation
+_FASTEST = 1.1  # times the top speed; more is an error of the observation
 _BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
 _MOST_OFF = 0.08  # m from where the body should be, before the drive is planned anew
 
@@ -45,7 +44,7 @@ class Drive:
         return action
 
     def planned(
-        self, path: list[Cell], walls: np.ndarray, body: Body, cell_size: float, strafes: bool = True
+        self, path: list[Cell], walls: np.ndarray, body: MovingBody, cell_size: float, strafes: bool = True
     ) -> tuple[int, Point]:
         """Returns that action, and the point (x, y) that it should bring the body to."""
         if len(path) == 1:
@@ -57,7 +56,7 @@ class Drive:
         return self.next(blocked, path, body, cell_size, strafes)
 
     def next(
-        self, blocked: np.ndarray, path: list[Cell], body: Body, cell_size: float, strafes: bool = True
+        self, blocked: np.ndarray, path: list[Cell], body: MovingBody, cell_size: float, strafes: bool = True
     ) -> tuple[int, Point]:
         """Returns the next action along `path`, and the point (x, y) that it should bring the body to, in cells.
 
@@ -83,8 +82,9 @@ class Drive:
             first = np.array([column, size - 1 - row])
             inside = np.clip((body.x, body.y), first + _INSIDE, first + 1 - _INSIDE)
             x, y = ((inside - corner) * cell_size).tolist()
-            velocity = np.clip(np.array(body.velocity()) * cell_size, -_FASTEST, _FASTEST).tolist()
-            course = make_course(walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
+            fastest = _FASTEST * body.model.top_speed
+            velocity = np.clip(np.array(body.velocity()) * cell_size, -fastest, fastest).tolist()
+            course = make_course(body.model, walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
             steps = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING
             actions, points = quickest_drive(course, (x, y), velocity, body.yaw, steps, _WIDTH, strafes)
             self.actions, self.path = actions[:_STEPS_USED], ahead

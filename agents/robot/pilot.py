@@ -10,7 +10,7 @@ import numpy as np
 from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.world.angles import wrap_angle
 
-from .body import BACKWARD, FORWARD, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Body, Point
+from .moving_body import BACKWARD, FORWARD, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, MovingBody, Point
 
 _LOOKAHEAD = 0.8  # m along the path to the point aimed at
 _SEGMENTS_AHEAD = 3  # searched for the nearest one; with more, the nearest could be one of a parallel corridor
@@ -24,7 +24,7 @@ _DRIVES = (
 )
 
 
-def steer(body: Body, aim: Point, strafes: bool) -> int:
+def steer(body: MovingBody, aim: Point, strafes: bool) -> int:
     """Returns the drive nearest to the direction of `aim`, or a turn if even that one is far off.
 
     `strafes` says whether the body can strafe.
@@ -48,7 +48,7 @@ class Pilot:
         self.lookahead = cells_per_metre * _LOOKAHEAD  # cells
         self.segment = 0  # the body is on the way from points[segment] to the next
 
-    def action(self, body: Body, strafes: bool) -> int:
+    def action(self, body: MovingBody, strafes: bool) -> int:
         """Returns the drive or turn that brings the body, which strafes or not, towards the aim."""
         # The segment nearest to where the body comes to rest, this one or one of the next, and how far along it that
         # is. Centres of neighbouring cells are 1 apart. Of equally near segments, the last one.

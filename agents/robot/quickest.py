@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mazebench.constants import NUM_ACTIONS, STEP_TIME, TOP_SPEED
+from mazebench.constants import NUM_ACTIONS, STEP_TIME
 from mazebench.kernels import compiled
+from mazebench.world.bodies import Body
 
-from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, TURN_STEP, Point
-from .motion import REACH, moved
+from .motion import Motion, moved
+from .moving_body import LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Point
 
 _NODES = 5  # a side of a cell
 _DETOUR = 3.0  # a metre of a way along which the body touches a wall counts as so many
@@ -31,7 +32,7 @@ _DRIVEN_WEIGHT = 0.3  # of a metre that was driven against one that is left
 _ARRIVED = -1e9  # added to the score of a state in the goal cell: lower than all others
 
 _STEPS_AHEAD, _WIDTH_AHEAD = 6, 2  # of the search that follows each first action in `costs_of_actions`
-_STEP_WAY = 0.5  # m at about the top speed; what a step is worth after which the goal is reached
+_STEP_SECONDS = 0.15625  # about a step at the top speed: what a step is worth after which the goal is reached
 
 _State = np.dtype(
     [
@@ -42,8 +43,9 @@ _State = np.dtype(
 
 
 class Course(NamedTuple):
-    """A maze and a goal in it."""
+    """A maze, a goal in it, and the body that drives there."""
 
+    motion: Motion
     walls: np.ndarray  # [N, N] bool
     cell_size: float  # m
     goal_x: int
@@ -51,15 +53,15 @@ class Course(NamedTuple):
     way_left: np.ndarray  # [N * _NODES, N * _NODES] float, m, from each node to the goal cell; infinite in walls
 
 
-def make_course(walls: np.ndarray, cell_size: float, goal: tuple[int, int]) -> Course:
-    """Returns the course to a goal (row, column) in a maze whose walls `[N, N]` are indexed by row and column.
+def make_course(body: Body, walls: np.ndarray, cell_size: float, goal: tuple[int, int]) -> Course:
+    """Returns a body's course to a goal (row, column) in a maze with walls `[N, N]`, indexed by row and column.
 
     The border is taken for wall, so that no drive leaves the maze.
     """
     by_x_and_y = np.ascontiguousarray(walls[::-1].T)
     by_x_and_y[[0, -1]] = by_x_and_y[:, [0, -1]] = True
-    x, y = goal[1], len(walls) - 1 - goal[0]
-    return Course(by_x_and_y, cell_size, x, y, _way_left(by_x_and_y, cell_size, x, y))
+    x, y, motion = goal[1], len(walls) - 1 - goal[0], Motion.of(body)
+    return Course(motion, by_x_and_y, cell_size, x, y, _way_left(motion, by_x_and_y, cell_size, x, y))
 
 
 def quickest_drive(
@@ -87,7 +89,7 @@ def quickest_drive(
     """
     turns = _TURNS if strafes else _TURNS_WITHOUT_STRAFING
     way_left = _way_left_at(course, *point)
-    expected = way_left / (TOP_SPEED * STEP_TIME) if way_left < np.inf else 0.0
+    expected = way_left / (course.motion.top_speed * STEP_TIME) if way_left < np.inf else 0.0
     beams = np.zeros(((num_steps or int(2 * expected) + 49) + 1, width * (2 * turns + 1)), _State)
     first = beams[0, 0]
     first["x"], first["y"], first["vx"], first["vy"] = *point, *velocity
@@ -103,13 +105,20 @@ def quickest_drive(
 
 @compiled
 def costs_of_actions(
-    walls: np.ndarray, way_left: np.ndarray, goal: np.ndarray, cell_size: float, pose: np.ndarray, velocity: np.ndarray
+    motion: Motion,
+    walls: np.ndarray,
+    way_left: np.ndarray,
+    goal: np.ndarray,
+    cell_size: float,
+    pose: np.ndarray,
+    velocity: np.ndarray,
 ) -> np.ndarray:
     """Returns `[B, 6]`: metres of way left after each action and the best steps that a narrow search finds after it.
 
     Less is better; a goal that is reached early counts as less than no way. Only differences mean something.
 
     Args:
+      motion: of the bodies.
       walls: `[B, N, N]` bool, `Course.walls` of each body's course.
       way_left: `[B, N * 5, N * 5]` float, `Course.way_left`.
       goal: `[B, 2]` int, the goals' x and y in cells.
@@ -120,20 +129,19 @@ def costs_of_actions(
     costs = np.empty((len(pose), NUM_ACTIONS))
     beams = np.zeros((_STEPS_AHEAD + 1, _WIDTH_AHEAD * (2 * _TURNS + 1)), _State)
     for body in range(len(pose)):
-        course = Course(walls[body], cell_size, goal[body, 0], goal[body, 1], way_left[body])
+        course = Course(motion, walls[body], cell_size, goal[body, 0], goal[body, 1], way_left[body])
         for action in range(NUM_ACTIONS):
-            yaw = pose[body, 2] + TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
+            yaw = pose[body, 2] + motion.turn_step * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
             first = beams[0, 0]
-            first.x, first.y, first.vx, first.vy = moved(
-                course.walls, cell_size, pose[body, 0], pose[body, 1], velocity[body, 0], velocity[body, 1], yaw, action
-            )
+            x, y, vx, vy = pose[body, 0], pose[body, 1], velocity[body, 0], velocity[body, 1]
+            first.x, first.y, first.vx, first.vy = moved(motion, course.walls, cell_size, x, y, vx, vy, yaw, action)
             first.driven, first.turns = 0.0, 0
             last = 0
             if int(first.x / cell_size) != course.goal_x or int(first.y / cell_size) != course.goal_y:
                 last = _search(course, yaw, beams, _TURNS)
                 costs[body, action] = beams[last, 0].score
             if last == 0 or costs[body, action] < 0:
-                costs[body, action] = -_STEP_WAY * (_STEPS_AHEAD - last)
+                costs[body, action] = -_STEP_SECONDS * motion.top_speed * (_STEPS_AHEAD - last)
     return costs
 
 
@@ -154,7 +162,7 @@ def _search(course: Course, yaw: float, beams: Any, turns: int) -> int:
                 child = children[num_children]
                 child.parent, child.action = parent, action
                 num_children += _drive(course, yaw, beams[step - 1, parent], child, turns)
-        count = _keep_best(children[:num_children], beams[step], turns)
+        count = _keep_best(course.motion, children[:num_children], beams[step], turns)
         if beams[step, 0].score < 0:
             return step
     return len(beams) - 1
@@ -164,14 +172,16 @@ def _search(course: Course, yaw: float, beams: Any, turns: int) -> int:
 def _drive(course: Course, yaw: float, state: Any, child: Any, turns: int) -> bool:
     """Makes `child` the state after an action from `state`; returns whether it turns no further than it may."""
     child.turns = state.turns + (child.action == LOOK_LEFT) - (child.action == LOOK_RIGHT)
-    heading = yaw + TURN_STEP * child.turns
-    x, y, vx, vy = moved(course.walls, course.cell_size, state.x, state.y, state.vx, state.vy, heading, child.action)
+    heading = yaw + course.motion.turn_step * child.turns
+    x, y, vx, vy = moved(
+        course.motion, course.walls, course.cell_size, state.x, state.y, state.vx, state.vy, heading, child.action
+    )
     child.x, child.y, child.vx, child.vy = x, y, vx, vy
     child.driven = state.driven + math.hypot(x - state.x, y - state.y)
     if int(x / course.cell_size) == course.goal_x and int(y / course.cell_size) == course.goal_y:
         child.score = child.driven + _ARRIVED
     else:
-        left = _way_left_at(course, x + COASTING_TIME * vx, y + COASTING_TIME * vy)
+        left = _way_left_at(course, x + course.motion.coasting_time * vx, y + course.motion.coasting_time * vy)
         if left == np.inf:  # a wall would stop the body
             left = _way_left_at(course, x, y)
         child.score = left + _DRIVEN_WEIGHT * child.driven
@@ -179,7 +189,7 @@ def _drive(course: Course, yaw: float, state: Any, child: Any, turns: int) -> bo
 
 
 @compiled
-def _keep_best(children: Any, beam: Any, turns: int) -> int:
+def _keep_best(motion: Motion, children: Any, beam: Any, turns: int) -> int:
     """Puts the best children that differ into a beam, the best one first, some of each heading; returns how many."""
     order = np.argsort(children.score)
     num_kept = np.zeros(2 * turns + 1, np.int64)
@@ -191,7 +201,7 @@ def _keep_best(children: Any, beam: Any, turns: int) -> int:
         is_new = num_kept[child.turns + turns] < len(beam) // len(num_kept)
         for other in beam[:count]:
             apart = abs(other.x - child.x) + abs(other.y - child.y)
-            apart += COASTING_TIME * (abs(other.vx - child.vx) + abs(other.vy - child.vy))
+            apart += motion.coasting_time * (abs(other.vx - child.vx) + abs(other.vy - child.vy))
             is_new = is_new and (other.turns != child.turns or apart > _SAME)
         if is_new:
             beam[count] = child
@@ -201,10 +211,10 @@ def _keep_best(children: Any, beam: Any, turns: int) -> int:
 
 
 @compiled
-def _way_left(walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> np.ndarray:
+def _way_left(motion: Motion, walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> np.ndarray:
     """Returns `Course.way_left`."""
     spacing = cell_size / _NODES
-    reach = math.ceil(REACH / spacing)  # nodes, from the body's centre to where walls begin to push
+    reach = math.ceil(motion.reach / spacing)  # nodes, from the body's centre to where walls begin to push
     left = np.full((len(walls) * _NODES, len(walls) * _NODES), np.inf)
     is_done = np.zeros(left.shape, np.bool_)
     queue = [(0.0, goal_x * _NODES + i, goal_y * _NODES + j) for i in range(_NODES) for j in range(_NODES)]

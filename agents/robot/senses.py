@@ -19,12 +19,12 @@ from mazebench.tasks.context import START
 from mazebench.world.ray_casting import LidarModel
 
 from .beams import MOST_EVIDENCE, add_scan, beams_of
-from .body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, Point, observed_body
 from .cells import marked_cell, nearest_cell
 from .contacts import felt_walls
 from .dead_reckoning import DeadReckoning
 from .map_matching import MapBelief
 from .map_reading import read_map
+from .moving_body import LOOK_LEFT, LOOK_RIGHT, MovingBody, Point, observed_body
 from .occupancy import SURE, posterior, seen_walls
 from .tracking import Tracker, aligned
 
@@ -42,7 +42,7 @@ class Memory:
     """Everything that the robot knows in one environment; all is on one grid."""
 
     belief: MapBelief  # of how the map lies on the grid
-    body: Body
+    body: MovingBody
     deviation: float  # standard deviation of the body's position, m
     cell_size: float  # m
     tracker: Tracker | None = None  # where a lidar is needed to know the pose
@@ -90,7 +90,7 @@ class Memory:
         With a `heading` of its own, it drives as a body with this heading would, and turns by `turn` looks to the left.
         """
         looks = (action == LOOK_LEFT) - (action == LOOK_RIGHT) if turn is None else turn
-        self.commanded, self.action = np.array([*point, self.body.yaw + TURN_STEP * looks]), action
+        self.commanded, self.action = np.array([*point, self.body.yaw + self.body.model.turn_step * looks]), action
         self.heading = heading
 
 
@@ -110,7 +110,7 @@ class Senses:
         if interface.context_size < interface.size:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
-        self._odometry_noise = interface.odometry_noise
+        self._body, self._odometry_noise = interface.body, interface.odometry_noise
         self._beams, self._camera = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size), None
         self._has_ranges = "lidar" in interface.sensors
         self.feels, self.is_narrow = not self._has_ranges, False  # whether it also feels walls, and sees ahead only
@@ -132,7 +132,7 @@ class Senses:
 
     def observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
         """Returns the memory after an observation in environment `slot`; a new one where an episode begins."""
-        observed = observed_body(inputs.observation["state"][slot].tolist(), 1 / self._cell_size)
+        observed = observed_body(self._body, inputs.observation["state"][slot].tolist(), 1 / self._cell_size)
         context, ranges = inputs.observation["context"][slot], None
         if self._has_ranges:
             metres = inputs.observation["lidar"][slot].astype(np.float64)
@@ -167,7 +167,7 @@ class Senses:
             memory.prior, memory.goal = memory.belief.mixture()
         return memory
 
-    def _begin(self, context: np.ndarray, observed: Body, ranges: np.ndarray | None) -> Memory:
+    def _begin(self, context: np.ndarray, observed: MovingBody, ranges: np.ndarray | None) -> Memory:
         """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
         off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
@@ -199,7 +199,7 @@ class Senses:
         tracker = Tracker(pose, odometry, self._odometry_noise)
         return Memory(belief, observed._replace(x=x, y=y, yaw=yaw), _TRACKED, self._cell_size, tracker, reckoning)
 
-    def _localize(self, memory: Memory, observed: Body, ranges: np.ndarray | None) -> None:
+    def _localize(self, memory: Memory, observed: MovingBody, ranges: np.ndarray | None) -> None:
         """Takes in the body as it is observed one step on; without a lidar, a wall has stopped it if it is slow."""
         before, body = memory.body, observed
         if memory.dead_reckoning is not None:
@@ -217,6 +217,6 @@ class Senses:
                 memory.evidence[cell] = min(memory.evidence[cell] + log_odds, MOST_EVIDENCE)
 
 
-def _pose(body: Body) -> np.ndarray:
+def _pose(body: MovingBody) -> np.ndarray:
     """Returns x, y and yaw as `[3]` float."""
     return np.array([body.x, body.y, body.yaw])

@@ -19,7 +19,7 @@ from mazebench.constants import STEP_TIME
 from mazebench.kernels import compiled, inlined
 
 from .beams import Beams, log_likelihood, log_likelihoods
-from .body import Body
+from .moving_body import MovingBody
 from .occupancy import seen_walls
 
 _DEVIATION = 0.03  # m, of a position that was matched
@@ -88,11 +88,11 @@ class Tracker:
         self.moved += (measured.conjugate() * corrected).real / metre**2
         self.pose[:2] = np.clip(self.pose[:2], 0.01, len(walls) - 0.01)
 
-    def body(self, observed: Body) -> Body:
+    def body(self, observed: MovingBody) -> MovingBody:
         """Returns the body in the grid's frame; its velocities carry the errors of the odometry's last step."""
         x, y, yaw = self.pose.tolist()
         forward, left = observed.forward - self.error.real / STEP_TIME, observed.left - self.error.imag / STEP_TIME
-        return Body(x, y, yaw, forward, left)
+        return MovingBody(observed.model, x, y, yaw, forward, left)
 
 
 def aligned(size: int, ranges: np.ndarray, beams: Beams) -> np.ndarray:

@@ -161,7 +161,9 @@ class Environment(control.Environment):
         """
         require_task(task)
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
-        super().__init__(Physics.of_mazes(models_of(task.mazes)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION)
+        super().__init__(
+            Physics.of_mazes(models_of(task.mazes, task.body)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION
+        )
 
     @property
     def maze_task(self) -> MazeTask:

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mazebench.constants import STATE_SIZE
 from mazebench.envs import spaces
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
@@ -15,7 +16,6 @@ from mazebench.tasks.context import GOAL, NUM_PLANES
 from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import SPARSE
-from mazebench.world.simulation import STATE_SIZE
 
 _SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
 

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from mazebench.constants import VELOCITIES
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
-from mazebench.tasks.actions import controls_of_action, controls_of_velocities
+from mazebench.tasks.actions import Actions
 from mazebench.tasks.arguments import Arguments, require_task
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.route import Route
@@ -41,6 +40,7 @@ class TaskRunner:
         """
         require_task(task)
         self.maze_task = task
+        self._body, self._actions = task.body, Actions(task.actions, task.body)
         self.rules = Rules(task, num_envs=1)
         self.rng = np.random.default_rng()
         self._next_episode: Episode | None = None
@@ -102,10 +102,7 @@ class TaskRunner:
           InputError: if there is no such action.
         """
         simulation.surround(self.rules.maze.item(), self.rules.cell.item())
-        if self.maze_task.actions in VELOCITIES:
-            simulation.set_controls(controls_of_velocities(self.maze_task.actions, np.asarray(action)))
-        else:
-            simulation.set_controls(controls_of_action(self.maze_task.actions, action))  # type: ignore[arg-type]
+        simulation.set_controls(self._actions.controls_of_one(action))
 
     def after_step(self, simulation: Simulation) -> None:
         """Takes note of what the action led to."""
@@ -115,7 +112,7 @@ class TaskRunner:
 
     def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
         """Returns the observation of the present moment; each call draws new noise."""
-        observed = self.rules.observe(simulation.state()[None], _INDEX)
+        observed = self.rules.observe(self._body.state(simulation.data.sensordata)[None], _INDEX)
         found = {"state": observed.pop("state")[0], "context": self.rules.context[0].copy()}
         return found | {name: values[0] for name, values in observed.items()}
 

@@ -15,11 +15,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from mazebench.constants import RENDERING, STEPS_PER_ACTION, VELOCITIES
+from mazebench.constants import RENDERING, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
-from mazebench.tasks.actions import controls_of_actions, controls_of_velocities
+from mazebench.tasks.actions import Actions
 from mazebench.tasks.arguments import Arguments, require_task, reset_options
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import observation_specs
@@ -28,7 +28,6 @@ from mazebench.tasks.task import Task
 from mazebench.world.batch import open_batch
 from mazebench.world.near_walls import WallGeoms, near_walls_of
 from mazebench.world.rendering import Cameras
-from mazebench.world.simulation import states_from_sensors
 
 # Returns the next episode of environment i; None ends the environment, which is not stepped any more.
 EpisodeSource = Callable[[int], Episode | None]
@@ -115,7 +114,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._observed["context"] = self.rules.context
 
         # The simulation, with views of its arrays.
-        self._walls = near_walls_of(task.mazes, num_envs)
+        self._body, self._actions = task.body, Actions(task.actions, task.body)
+        self._walls = near_walls_of(task.mazes, num_envs, task.body)
         self._process = os.getpid()
         self._batch = open_batch(self._walls.model, num_envs, arguments.num_threads)
         self._geoms = WallGeoms.of_batch(self._batch)
@@ -190,10 +190,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """
         self._require_open()
         self._require_reset()
-        if (kind := self.task.actions) in VELOCITIES:
-            self._ctrl[:] = controls_of_velocities(kind, actions, (self.num_envs,))
-        else:
-            self._ctrl[:] = controls_of_actions(kind, actions, self.num_envs)
+        self._ctrl[:] = self._actions.controls(actions, self.num_envs)
 
         # Simulate the environments whose episode is under way.
         running = self.rules.active & ~self._ended
@@ -290,7 +287,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def _observe(self, indices: np.ndarray) -> None:
         """Takes over what the agents of the environments `indices` observe; each call draws new noise."""
-        states = states_from_sensors(self._sensordata[indices])
+        states = self._body.states(self._sensordata[indices])
         for name, values in self.rules.observe(states, indices).items():
             if len(indices) == self.num_envs:
                 self._observed[name] = values  # pictures are large, so they are not copied
@@ -319,7 +316,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(self.task.mazes, ("top",))
+            self._top_camera = Cameras(self.task.mazes, ("top",), body=self.task.body)
         worlds = zip(self.rules.maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 

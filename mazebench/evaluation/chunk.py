@@ -210,7 +210,7 @@ def to_record(plan: Plan, result: Result) -> Record:
     episode, leg = trial.episode, trial.legs[result.leg - 1]
     maze = task.mazes[episode.maze]
     if (start := result.after_miss) is not None:
-        leg = Leg(start, leg.goal, maze.distance(start, leg.goal), shortest_path(maze, start, leg.goal))
+        leg = Leg(start, leg.goal, maze.distance(start, leg.goal), shortest_path(maze, start, leg.goal, task.body))
     # Of the body as a disc, and from cell to cell; both in metres.
     shortest = np.array([leg.shortest_path, leg.distance * task.cell_size])
     spl_of_disc, spl_grid = spl(np.array([result.success]), shortest, np.array([result.path_length])).tolist()

@@ -185,7 +185,7 @@ def make_plan(
         per_maze = options.episodes_per_maze or FROZEN_PER_MAZE
         trials = select_trials(task, options.episodes_per_distance, options.seed, per_maze)
     origin = provenance(options, task, agent_class)
-    world = largest_spec(task.mazes[0])  # the hash of the mazes tells the walls, too
+    world = largest_spec(task.mazes[0], task.body)  # the hash of the mazes tells the walls, too
     is_part = options.episodes_per_maze not in (None, FROZEN_PER_MAZE)
     identity = {
         "agent": options.agent,

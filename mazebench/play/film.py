@@ -173,7 +173,7 @@ class _Scene:
         self._path: list[np.ndarray] = []  # [2] m each
         self.record_position()
         names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.options.sensors)
-        self._cameras = Cameras(self._task.mazes, names, self.pixels) if names else None
+        self._cameras = Cameras(self._task.mazes, names, self.pixels, self._task.body) if names else None
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""

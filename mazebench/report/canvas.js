@@ -84,10 +84,10 @@ function drawPath(pen, path, time, size, color) {
   drawBody(pen, ...place(time), -angleOf(path, time), scale, color);
 }
 
-// A disc of the body's radius and its nose; the canvas has y down, so the angle comes negated.
+// A disc and a nose for the body; the canvas has y down, so the angle comes negated.
 function drawBody(pen, x, y, angle, scale, color) {
   pen.beginPath();
-  pen.arc(x, y, data.units.body * scale, 0, 2 * Math.PI);
+  pen.arc(x, y, 0.15 * scale, 0, 2 * Math.PI);
   pen.fillStyle = color("body");
   pen.fill();
   pen.lineWidth = 0.08 * scale;

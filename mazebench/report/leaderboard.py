@@ -32,7 +32,7 @@ from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.tasks.trials import frozen_trials
-from mazebench.world.near_walls import FASTEST
+from mazebench.world.bodies import SLIDER
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
 PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
@@ -182,10 +182,10 @@ def _read_episodes(result: Result) -> pd.DataFrame:
     # What is faster than the physics lets a body be was moved by something else. A metre is left for the goal's size.
     success, seconds = column(records, "success"), STEP_TIME * column(records, "steps")
     driven = np.maximum(column(records, "path_length"), success * (column(records, "shortest_path") - 1))
-    if (too_fast := driven > FASTEST * seconds).any():
+    if (too_fast := driven > SLIDER.fastest * seconds).any():
         number = int(too_fast.argmax())
         found = f"{driven[number]:.1f} m in {seconds[number]:.1f} s in episode {number}"
-        raise InputError(f"{result.folder}: expected bodies of at most {FASTEST:.1f} m/s, found {found}")
+        raise InputError(f"{result.folder}: expected bodies of at most {SLIDER.fastest:.1f} m/s, found {found}")
 
     on_time = ON_TIMES[0].of(records)
     return pd.DataFrame(

@@ -28,7 +28,6 @@ from mazebench.report.table import Table
 from mazebench.results import naming
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
-from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
 # Without the palest yellow, which is invisible on white.
@@ -119,7 +118,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
     return {
         "settings": list(map(naming.described, settings)),
         "rays": NUM_RAYS,
-        "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
+        "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME},
         "timeColors": [mpl.colors.to_hex(color) for color in _TIME_COLORS],
         "mazes": [{"name": name, "walls": walls} for name, walls in mazes],
         "results": described,

@@ -8,6 +8,7 @@ from mazebench.options import fields_of
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, NOISE_OF_SENSORS, SENSORS
 from mazebench.tasks.task_options import ENDS, TaskOptions
 from mazebench.tasks.tracks import LEVELS
+from mazebench.world.bodies import SLIDER
 
 # Options that an agent may choose, or is not told, while the same is played.
 _OF_AGENTS = ("actions", "sensors", *CHOICES_OF_SENSORS, "hide", "exact_pose", "context_size")
@@ -44,11 +45,12 @@ def described(options: TaskOptions) -> str:
 
 
 def own_in_words(options: TaskOptions) -> tuple[str, ...]:
-    """Returns the choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
+    """Returns a user's choices besides the mazes: the body, the size of a cell, start and goal, noise on the senses."""
+    body = () if options.body == SLIDER.name else (f"body {options.body}",)
     scale = () if options.cell_size in (None, 1) else (f"cells of {options.cell_size:g} m",)
     shown = () if options.shown is None else ("an older map shown",)
     ends = (f"{name} {end}" for name in ENDS if (end := getattr(options, name)) is not None)
-    return (*scale, *shown, *ends, *noise_in_words(options))
+    return (*body, *scale, *shown, *ends, *noise_in_words(options))
 
 
 def noise_in_words(options: TaskOptions) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import dataclasses
 
 from mazebench.constants import VELOCITIES
 from mazebench.errors import UnplayableError
+from mazebench.world.bodies import SLIDER, Body
 from mazebench.world.looks import Camera
 from mazebench.world.ray_casting import LidarModel
 
@@ -24,6 +25,7 @@ class Interface:
     lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
     camera: Camera | None = None  # of the sensors egocentric, depth and labels; None without them
     odometry_noise: float = 0.0  # alpha of `mazebench.tasks.perturbations.odometry.NoisyMotion`
+    body: Body = SLIDER  # that is driven
 
     @property
     def action_shape(self) -> tuple[int, ...]:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from dm_env import specs
 
+from mazebench.constants import STATE_SIZE
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, perturbations_of
 from mazebench.tasks.perturbations.perturbation import Of, StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import Sensor, Worlds
 from mazebench.tasks.task import Task
-from mazebench.world.simulation import STATE_SIZE
 
 Noise = tuple[np.random.Generator | None, ...]  # by sensor: of what is drawn in one episode; None if nothing is
 

@@ -14,6 +14,7 @@ from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import default_time_limit
+from mazebench.world.bodies import Body
 
 # What an agent step led to.
 Event = enum.Enum("Event", ["NONE", "LANDMARK", "REACHED", "TIMEOUT"])
@@ -79,7 +80,8 @@ def plan_route(task: Task, episode: Episode, shown: ShownMap) -> Route:
     if not options.is_hierarchical:
         _, *later = goals_of(task, episode)
         num_left, joined = options.num_goals - 1, task.arena.joined(episode.maze)
-        legs = _LaterLegs(num_left, maze, options.track, options.time_limit, later, task.distances, joined, episode)
+        limits = task.body, options.track, options.time_limit
+        legs = _LaterLegs(num_left, maze, *limits, later, task.distances, joined, episode)
         return Route([episode.start, episode.goal], legs.limit(episode.start, episode.goal), legs)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     assert options.time_limit is not None  # a task that is no track has one
@@ -92,6 +94,7 @@ class _LaterLegs:
 
     num_left: int
     maze: Maze
+    body: Body
     track: str | None
     time_limit: int | None  # agent steps of all legs; None on a track, whose limits follow from the distances
     goals: list[Cell]  # those that were drawn before the episode; others are drawn where their legs start
@@ -112,5 +115,5 @@ class _LaterLegs:
     def limit(self, start: Cell, goal: Cell) -> int:
         """Returns the time limit of a leg."""
         return self.time_limit or default_time_limit(
-            self.maze.distance(start, goal), self.maze.cell_size, track=self.track
+            self.maze.distance(start, goal), self.maze.cell_size, self.body, track=self.track
         )

@@ -21,6 +21,7 @@ from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.task_options import DRAWN_KINDS, HIERARCHICAL, LOCAL, NUM_DRAWN, TaskOptions
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS, cells_of
+from mazebench.world.bodies import BODIES, SLIDER, Body
 
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
@@ -112,6 +113,11 @@ class Task:
         return tuple(cells_of(each, self.cell_size, self.options.track) for each in self.options.distances or ())
 
     @property
+    def body(self) -> Body:
+        """The body that is driven."""
+        return BODIES[self.options.body]
+
+    @property
     def levels(self) -> tuple[int, ...]:
         """The levels of the track, of which each episode draws one; none without a track."""
         return self.options.level or ()
@@ -160,6 +166,7 @@ class Task:
             cell_size=self.cell_size,
             hidden=options.hide,
             **told,
+            body=self.body,
         )
 
 
@@ -186,7 +193,12 @@ def resolve(
             return asked
         wanted = None if asked.options.track is not None else context_size_of(asked.size)
         return asked.replace(context_size=wanted)
-    arena = arena or arena_of(asked)
+    arena, body = arena or arena_of(asked), BODIES[asked.body]
+    if arena.cell_size < 2 * body.reach:
+        raise InputError(
+            f"body {body.name!r}: expected cells of at least {2 * body.reach:g} m, through which it passes, "
+            f"found {arena.cell_size:g} m"
+        )
     split, level = asked.split or "train", asked.level or (() if asked.track is None else LEVELS[:1])
     if asked.track is not None:
         arena.require_levels(asked.track, level)
@@ -201,8 +213,8 @@ def resolve(
     time_limit = asked.time_limit
     if asked.track is None and time_limit is None:
         cells = asked.landmark_distance if asked.is_hierarchical else max(chosen)
-        is_new = asked.has_own or asked.is_drawn
-        time_limit = default_time_limit(cells, arena.cell_size, track=None, is_new=is_new)
+        is_new = asked.has_own or asked.is_drawn or body != SLIDER
+        time_limit = default_time_limit(cells, arena.cell_size, body, track=None, is_new=is_new)
     arena.require_distances(chosen, asked.track)
 
     filled = asked.filled(

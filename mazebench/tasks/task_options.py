@@ -31,6 +31,7 @@ from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipSha
 from mazebench.tasks.perturbations.odometry import OdometryNoise
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, LIDAR, NOISE_OF_SENSORS, SENSORS, AllSensorOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.bodies import BODIES, SLIDER
 from mazebench.world.looks import PICTURES
 
 LOCAL, HIERARCHICAL = "local", "hierarchical"
@@ -187,6 +188,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         ),
     ] = None
 
+    body: Annotated[str, OneOf(*BODIES), Doc("The body that is driven.")] = SLIDER.name
+
     # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
     map_flip: FlipShare = 0.0
     map_warp: WarpShare = 0.0
@@ -242,7 +245,7 @@ class TaskOptions(AllSensorOptions, ReadOptions):
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
         changed = self.changed()
-        left = {name for name in ("reward", *CHOICES_OF_SENSORS) if name not in changed}
+        left = {name for name in ("reward", "body", *CHOICES_OF_SENSORS) if name not in changed}
         values = {name: value for name, value in vars(self).items() if value is not None and name not in left}
         if self.mazes is not None:  # a path may have bytes that JSON has not
             own = self.mazes

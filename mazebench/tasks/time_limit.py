@@ -7,20 +7,26 @@ from __future__ import annotations
 
 import math
 
+from mazebench.constants import STEP_TIME
 from mazebench.tasks.tracks import TRACKS
+from mazebench.world.bodies import Body
 
 TIME_LIMIT = 100  # in the mazes of the paper's protocol
 
-# A metre takes 2 steps at the top speed, and a quarter turn in each cell 4. On tracks, a turn comes at every metre.
-_STEPS_PER_METRE, _STEPS_PER_CELL = 2, 4
-_SPARE_STEPS = 50
-_LOST_SPARE_STEPS = 150  # so that a lost robot can look for its pose
+# Metres that a body can drive in the steps to spare; the second one, so that a lost robot can look for its pose.
+_SPARE, _LOST_SPARE = 25, 75
 
 
-def default_time_limit(num_cells: int, cell_size: float, *, track: str | None, is_new: bool = False) -> int:
-    """Returns the limit for a goal `num_cells` away; `is_new` says that the maze or an end is the user's, or drawn."""
+def default_time_limit(num_cells: int, cell_size: float, body: Body, *, track: str | None, is_new: bool = False) -> int:
+    """Returns the limit of a body for a goal `num_cells` away.
+
+    `is_new` says that the maze, an end or the body is not the benchmark's.
+    """
+    # The slider takes 2 steps for a metre at its top speed, and 4 for a quarter turn. A turn comes at each cell, on
+    # tracks at every metre.
+    of_metre, of_turn = math.ceil(1 / (body.top_speed * STEP_TIME)), round(math.pi / 2 / body.turn_step)
     if track is not None:
-        steps = math.ceil((_STEPS_PER_METRE + _STEPS_PER_CELL) * cell_size * num_cells)
-        return steps + (_LOST_SPARE_STEPS if TRACKS[track].hides_pose else _SPARE_STEPS)
-    steps = math.ceil((_STEPS_PER_METRE * cell_size + _STEPS_PER_CELL) * num_cells)
-    return max(TIME_LIMIT, steps + _SPARE_STEPS) if is_new else TIME_LIMIT
+        steps = math.ceil((of_metre + of_turn) * cell_size * num_cells)
+        return steps + of_metre * (_LOST_SPARE if TRACKS[track].hides_pose else _SPARE)
+    steps = math.ceil((of_metre * cell_size + of_turn) * num_cells)
+    return max(TIME_LIMIT, steps + of_metre * _SPARE) if is_new else TIME_LIMIT

@@ -25,7 +25,7 @@ from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import DISTANCES
-from mazebench.world.mjcf import BODY_RADIUS
+from mazebench.world.bodies import SLIDER, Body
 
 # Of a file of frozen episodes.
 COLUMNS = (
@@ -139,8 +139,18 @@ def select_trials(
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    frozen_split, wanted = task.options.frozen_split, episodes_per_distance or _PER_MAZE
-    if frozen_split is not None and task.options.track is not None:
+    chosen = _select_frozen(task, episodes_per_distance or _PER_MAZE, episodes_per_maze)
+    if chosen is None:
+        return [with_later_legs(task, trial) for trial in draw_trials(task, episodes_per_distance, seed)]
+    return chosen if task.body == SLIDER else [_for_other_body(task, trial) for trial in chosen]
+
+
+def _select_frozen(task: Task, wanted: int, episodes_per_maze: int) -> Sequence[Trial] | None:
+    """Returns the frozen episodes to evaluate, `wanted` for each maze and distance; None where they don't go so far."""
+    frozen_split = task.options.frozen_split
+    if frozen_split is None:
+        return None
+    if task.options.track is not None:
         rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
         chosen = [
             index
@@ -154,9 +164,9 @@ def select_trials(
         are_frozen = task.distances == DISTANCES
         later = frozen_legs(frozen_split, _FrozenTrials(rows)) if are_frozen else [()] * len(rows)
         return [with_later_legs(task, trial, later[index]) for index, trial in zip(chosen, trials, strict=True)]
-    if frozen_split is not None and task.options.is_hierarchical:
+    if task.options.is_hierarchical:
         return _FrozenTrials(_frozen_rows(task.options.task, task.size))
-    if frozen_split is not None and set(task.distances) <= set(EVAL_DISTANCES) and wanted <= EPISODES_PER_DISTANCE:
+    if set(task.distances) <= set(EVAL_DISTANCES) and wanted <= EPISODES_PER_DISTANCE:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return _FrozenTrials(
             [
@@ -165,7 +175,17 @@ def select_trials(
                 if index % EPISODES_PER_DISTANCE < wanted and int(row["distance"]) in task.distances
             ]
         )
-    return [with_later_legs(task, trial) for trial in draw_trials(task, episodes_per_distance, seed)]
+    return None
+
+
+def _for_other_body(task: Task, trial: Trial) -> Trial:
+    """Returns a frozen trial with the shortest paths of the task's body; the oracle's steps, the slider's, are open."""
+    maze = task.mazes[trial.episode.maze]
+    first, *later = (
+        dataclasses.replace(leg, shortest_path=shortest_path(maze, leg.start, leg.goal, task.body), oracle_steps=None)
+        for leg in trial.legs
+    )
+    return Trial(trial.episode, first.distance, first.shortest_path, later_legs=tuple(later))
 
 
 def goals_file(split: str) -> str:
@@ -187,7 +207,7 @@ def with_later_legs(task: Task, trial: Trial, frozen: Sequence[Leg] = ()) -> Tri
     goals, maze = goals_of(task, trial.episode), task.mazes[trial.episode.maze]
     legs = [*frozen[: len(goals) - 1]]
     for start, goal in itertools.pairwise(goals[len(legs) :]):
-        legs.append(Leg(start, goal, maze.distance(start, goal), shortest_path(maze, start, goal)))
+        legs.append(Leg(start, goal, maze.distance(start, goal), shortest_path(maze, start, goal, task.body)))
     return dataclasses.replace(trial, later_legs=tuple(legs))
 
 
@@ -205,7 +225,7 @@ def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DIS
         (start, goal), joined = task.arena.ends(index), task.arena.joined(index)
         if task.options.is_hierarchical:
             rng = np.random.default_rng([seed, maze.size, index])
-            trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal, joined), rng))
+            trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal, joined), rng, task.body))
             continue
         distances = sorted(set(task.distances))
         if start is not None and goal is not None:
@@ -221,22 +241,22 @@ def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DIS
                     if pair not in seen:
                         break
                 seen.add(pair)
-                trials.append(make_trial(maze, index, pair, rng))
+                trials.append(make_trial(maze, index, pair, rng, task.body))
     return trials
 
 
-def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
+def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator, body: Body = SLIDER) -> Trial:
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
     start, goal = pair
     episode = make_episode(index, start, goal, rng)
-    return Trial(episode, maze.distance(start, goal), shortest_path(maze, start, goal))
+    return Trial(episode, maze.distance(start, goal), shortest_path(maze, start, goal, body))
 
 
-def shortest_path(maze: Maze, start: Cell, goal: Cell) -> float:
-    """Returns the metres of a shortest path of the body as a disc from a cell's centre to a goal cell."""
+def shortest_path(maze: Maze, start: Cell, goal: Cell, body: Body) -> float:
+    """Returns the metres of a shortest path of a body as a disc from a cell's centre to a goal cell."""
     from mazebench.maps.geodesic import length_between  # loads numba, which frozen trials do without
 
-    return length_between(maze, BODY_RADIUS, start, goal)
+    return length_between(maze, body.radius, start, goal)
 
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:

@@ -14,17 +14,12 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
-from mazebench.constants import STEP_TIME, TOP_SPEED
+from mazebench.constants import STEP_TIME
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import Maze
-from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, boxes_spec, parked_boxes, placed_boxes
+from mazebench.world.bodies import Body
+from mazebench.world.mjcf import boxes_spec, parked_boxes, placed_boxes
 
-# A drive pushes a body to TOP_SPEED ahead. While it turns, it is pushed aside, too. Let v be its speed and c the cosine
-# of the angle between push and motion. v grows only while the push along it, c times at most 34 N, is above the
-# damping, 8 v: v < 4.25 c. The push falls below 34 N at v c = 3.06. So v can't grow beyond the v at which both hold,
-# 3.61 m/s. With two drives at once, as velocities set them, it is 3.643 m/s, over all pairs of them and all angles.
-FASTEST = 1.14 * TOP_SPEED
-_REACH = BODY_RADIUS + CONTACT_MARGIN + FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
 _MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
 _AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
 _FEW = 4  # bodies in other cells, whose boxes are sooner looked up one by one
@@ -59,11 +54,12 @@ class NearWalls:
     boxes are enough for any cell.
     """
 
-    def __init__(self, mazes: Mazes, num_slots: int):
+    def __init__(self, mazes: Mazes, num_slots: int, body: Body):
         """`num_slots` is how many mazes are kept: all of them or, of fresh mazes, one for each environment."""
         self._mazes, self._size, self._scale = mazes, mazes[0].size, mazes[0].cell_size
-        self._args, self._is_fresh = (mazes, num_slots), isinstance(mazes, FreshMazes)
-        reach = math.ceil(_REACH / self._scale)  # cells
+        self._args, self._is_fresh = (mazes, num_slots, body), isinstance(mazes, FreshMazes)
+        # From the body's centre at the start of an agent step.
+        reach = math.ceil((body.reach + body.fastest * STEP_TIME) / self._scale)  # cells
         width = self._size + 2 * reach
         self._offsets = (np.arange(2 * reach + 1)[:, None] * width + np.arange(2 * reach + 1)).ravel()  # [W]
         self._width, self._reach = width, reach
@@ -78,7 +74,7 @@ class NearWalls:
 
         self._entered: dict[tuple[int, int], list[np.ndarray]] = {}  # by maze and cell: what `_near` returns
 
-        self.model = boxes_spec(mazes[0], *self._parked).compile()
+        self.model = boxes_spec(mazes[0], *self._parked, body=body).compile()
         self.model.opt.disableflags |= _NO_TREE
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -166,11 +162,11 @@ def _assign(geoms: WallGeoms, env: np.ndarray | int, middle: np.ndarray, half: n
     geoms.rbound[env] = radius
 
 
-def near_walls_of(mazes: Mazes, num_envs: int) -> NearWalls:
+def near_walls_of(mazes: Mazes, num_envs: int, body: Body) -> NearWalls:
     """Returns the near walls of mazes for some environments; all environments with the same fixed mazes share them."""
-    return NearWalls(mazes, num_envs) if isinstance(mazes, FreshMazes) else _of_fixed(mazes)
+    return NearWalls(mazes, num_envs, body) if isinstance(mazes, FreshMazes) else _of_fixed(mazes, body)
 
 
 @functools.lru_cache(maxsize=8)
-def _of_fixed(mazes: tuple[Maze, ...]) -> NearWalls:
-    return NearWalls(mazes, len(mazes))
+def _of_fixed(mazes: tuple[Maze, ...], body: Body) -> NearWalls:
+    return NearWalls(mazes, len(mazes), body)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mazebench.maps.drawn import Mazes
 from mazebench.world.backend import RenderingError, rendering_error
+from mazebench.world.bodies import SLIDER, Body
 from mazebench.world.mjcf import boxes_spec, wall_boxes
 
 CAMERAS = ("top", "chase", "egocentric")
@@ -24,10 +25,10 @@ class Cameras:
     One model without walls does for all mazes: a picture is given the boxes.
     """
 
-    def __init__(self, mazes: Mazes, names: tuple[str, ...], pixels: int = _PICTURE_SIZE):
-        """`names` are of `CAMERAS`, `pixels` is the side of a picture."""
+    def __init__(self, mazes: Mazes, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, body: Body = SLIDER):
+        """`names` are of `CAMERAS`, `pixels` is the side of a picture, and `body` is in the mazes."""
         self._mazes, self._names, self._pixels = mazes, names, pixels
-        self._model = boxes_spec(mazes[0], *np.zeros((2, 0, 3))).compile()
+        self._model = boxes_spec(mazes[0], *np.zeros((2, 0, 3)), body=body).compile()
         self._data = mujoco.MjData(self._model)
         self._middle, self._half = np.zeros((2, 0, 3))  # of the boxes of the maze that was seen last
         self._maze = -1  # and its index

@@ -12,10 +12,8 @@ import mujoco
 import numpy as np
 
 from mazebench.world.angles import wrap_angle
-from mazebench.world.mjcf import SENSED_POSITION, SENSED_VELOCITIES, SENSED_YAW
 from mazebench.world.near_walls import NearWalls, WallGeoms
 
-STATE_SIZE = 12
 FULL_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # all that MuJoCo's next step depends on
 
 
@@ -41,7 +39,7 @@ class Simulation(abc.ABC):
         self.data.mocap_pos[0] = (*position, 0.0)
 
     def set_controls(self, controls: np.ndarray) -> None:
-        """Sets the controls (`[5]`) of the four drives and the turn; see `mjcf.action_controls`."""
+        """Sets the controls `[C]`; see `Body.action_controls`."""
         self.data.ctrl[:] = controls
 
     def position(self) -> np.ndarray:
@@ -51,11 +49,6 @@ class Simulation(abc.ABC):
     def yaw(self) -> float:
         """Returns the body's heading in [-pi, pi) rad, counter-clockwise from +x."""
         return wrap_angle(float(self.data.qpos[2]))
-
-    def state(self) -> np.ndarray:
-        """Returns the state, `[12]` float64; see `states_from_sensors`, of which plain numbers take half the time."""
-        x, y, z, yaw, *velocities = self.data.sensordata.tolist()
-        return np.array([x, y, z, 0.0, 0.0, wrap_angle(yaw), *velocities])
 
     @abc.abstractmethod
     def full_state(self) -> np.ndarray:
@@ -120,16 +113,3 @@ def _resumed(model: mujoco.MjModel, walls: NearWalls | None, state: np.ndarray) 
     simulation = MujocoSimulation(model, walls)
     simulation.set_full_state(state)
     return simulation
-
-
-def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
-    """Returns `[..., 12]` float64 states from `[..., 10]` values of the sensors that `mjcf` names.
-
-    A state is, in this order: position x, y, z (m); orientation roll, pitch, yaw (rad, yaw in [-pi, pi)); linear
-    velocity forward, left, up in the body's frame (m/s); angular velocity about the body's x, y, z (rad/s).
-    """
-    states = np.zeros((*sensors.shape[:-1], STATE_SIZE))
-    states[..., 0:3] = sensors[..., SENSED_POSITION]
-    states[..., 5] = wrap_angle(sensors[..., SENSED_YAW])
-    states[..., 6:12] = sensors[..., SENSED_VELOCITIES]
-    return states

@@ -1,4 +1,4 @@
-"""The body: its actions, what a state tells of it, and where it comes to rest.
+"""A body that moves: its actions, what a state tells of it, and where it comes to rest.
 
 Lengths are in cells of the map that the context shows, positions are (x, y) with x to the right and y up.
 """
@@ -21,10 +21,9 @@ from mazebench.constants import (
     X,
     Y,
 )
+from mazebench.world.bodies import Body
 
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(NUM_ACTIONS)
-TURN_STEP = math.radians(21.12)  # of one look action
-COASTING_TIME = 0.125  # s; a body let go at speed v comes to rest after v * COASTING_TIME metres
 
 # The kinds of actions that the robots play, and those of a body that can't strafe.
 PLAYED = (*DISCRETE, *VELOCITIES)
@@ -46,9 +45,10 @@ def as_kind(kind: str, actions: np.ndarray) -> np.ndarray:
     return _AS_KIND[kind][actions]
 
 
-class Body(NamedTuple):
+class MovingBody(NamedTuple):
     """Pose and velocities of a body, the latter in its own frame."""
 
+    model: Body  # its shape and speeds
     x: float
     y: float
     yaw: float  # rad
@@ -60,18 +60,18 @@ class Body(NamedTuple):
         cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
         return cosine * self.forward - sine * self.left, sine * self.forward + cosine * self.left
 
-    def turned(self, heading: float) -> Body:
+    def turned(self, heading: float) -> MovingBody:
         """Returns the body as if it had another heading (rad), with the velocity on the map that it has."""
         (x, y), cosine, sine = self.velocity(), math.cos(heading), math.sin(heading)
-        return Body(self.x, self.y, heading, cosine * x + sine * y, cosine * y - sine * x)
+        return MovingBody(self.model, self.x, self.y, heading, cosine * x + sine * y, cosine * y - sine * x)
 
     def rest(self) -> Point:
         """Returns the point (x, y) at which the body comes to rest if it is let go now."""
-        velocity_x, velocity_y = self.velocity()
-        return self.x + COASTING_TIME * velocity_x, self.y + COASTING_TIME * velocity_y
+        (velocity_x, velocity_y), coasting_time = self.velocity(), self.model.coasting_time
+        return self.x + coasting_time * velocity_x, self.y + coasting_time * velocity_y
 
 
-def observed_body(state: list[float], cells_per_metre: float) -> Body:
+def observed_body(model: Body, state: list[float], cells_per_metre: float) -> MovingBody:
     """Returns the body as a state `[12]` has it, whose x and y are taken for a place on the map."""
     x, y, forward, left = (cells_per_metre * state[index] for index in (X, Y, FORWARD_VELOCITY, LEFT_VELOCITY))
-    return Body(x=x, y=y, yaw=state[YAW], forward=forward, left=left)
+    return MovingBody(model, x=x, y=y, yaw=state[YAW], forward=forward, left=left)
