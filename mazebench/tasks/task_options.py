@@ -44,8 +44,6 @@ MOST_GOALS = 5  # of an episode on a track, all of which its shown map keeps fre
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
-_RETIRED = (("textures", False), ("walls", "filled"))  # options of earlier versions, and the values that said nothing
-
 
 def _as_mazes(mazes: Any) -> Any:
     """Returns the path of mazes as text, and mazes that JSON describes as mazes."""
@@ -238,12 +236,12 @@ class TaskOptions(SensorOptions, ReadOptions):
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Self:
-        """Returns the options of which `to_json` returned the content, here or in an earlier version.
+        """Returns the options of which `to_json` returned the content.
 
         Raises:
           InputError: if there is no such option, or a value is not allowed.
         """
-        return cls.of({name: value for name, value in content.items() if (name, value) not in _RETIRED})
+        return cls.of(content)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
