@@ -11,7 +11,7 @@ from mazebench_agents.common.layers import FAR_DILATIONS, NUM_PLACE, MapEncoder,
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.hypermodel import MMNNetwork, WayReader
 from mazebench_agents.mmn.losses import unrolled_losses
-from mazebench_agents.mmn.mmn_config import MMNConfig
+from mazebench_agents.mmn.mmn_config import MMNConfig, MMNEvalConfig
 from mazebench_agents.mmn.targets import Targets, make_batch
 from small_world import learn
 
@@ -203,6 +203,13 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks():
     _, state = agent.act(inputs_of(observation, every, np.array([False, True])), state)
     np.testing.assert_allclose(state.origin, [[0, 0], [0.8, 1.1]])
     torch.testing.assert_close(state.code.positions[:, :2], torch.tensor([[5.0, 1.0], [4.0, 2.0]]))
+
+
+def test_an_evaluation_sets_the_number_of_simulations():
+    configs = {None: 64, MMNEvalConfig(): 64, MMNEvalConfig(num_eval_simulations=4): 4}
+    for config, number in configs.items():
+        agent = MMN.build(Interface("local", 13, 13), config=config)
+        assert (agent.config.num_eval_simulations, agent.config.num_simulations) == (number, 8)
 
 
 def test_mmn_after_some_seconds_beats_random_in_a_small_maze():

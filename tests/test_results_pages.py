@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import re
 import tarfile
 
 import pandas as pd
@@ -10,7 +13,14 @@ import pytest
 import mazebench
 from benchmarks.results.kept import Kept, keep, read_kept
 from benchmarks.results.results_tables import PAGES, RECORDS, ROOT, with_tables
+from mazebench.agent_loading import load_agent_class
 from mazebench.results.reading import load_result
+
+DOCS = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")))
+COMMAND = re.compile(r"mazebench (eval|train|bench)|python (-m (benchmarks|mazebench)|docs/examples)|make results")
+GENERATED = re.compile(r"<!-- (table|leaderboard begins)\b.*?<!-- (end of table|leaderboard ends) -->", re.DOTALL)
+# Tables of numbers that were chosen, not measured, by their first line.
+CHOSEN = ("| map | repository",)
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +32,58 @@ def kept() -> Kept:
 def test_the_tables_of_a_page_are_those_of_the_records(page, kept):
     text = (ROOT / page).read_text(encoding="utf-8")
     assert "<!-- table: " in text
-    assert with_tables(text, kept) == text, "`make results` writes them"
+    assert with_tables(page, text, kept) == text, "`make results` writes them"
+
+
+@pytest.fixture(scope="module")
+def archives() -> dict[str, tuple[str, set[str]]]:
+    """The hash of all that each archive of evaluations holds, and the agents in it, by the archive's name."""
+    found = {}
+    for path in sorted(RECORDS.glob("*.tar.xz")):
+        contents, agents = {}, set()
+        with tarfile.open(path) as archive:
+            for member in archive:
+                content = archive.extractfile(member).read()
+                if member.name.endswith(".json"):
+                    values = json.loads(content)
+                    agents |= {values["agent"]} if "agent" in values else set()
+                    content = json.dumps(values, sort_keys=True).encode()
+                contents[member.name] = content
+        digest = hashlib.sha256()
+        for name in sorted(contents):
+            digest.update(name.encode() + b"\0" + hashlib.sha256(contents[name]).digest())
+        found[path.name.removesuffix(".tar.xz")] = digest.hexdigest(), agents
+    return found
+
+
+def test_kept_evaluations_are_what_they_were(archives):
+    kept = json.loads((ROOT / "tests" / "golden" / "records.json").read_text())
+    assert {name: archives[name][0] for name in kept} == kept
+
+
+def test_every_agent_of_a_record_can_be_loaded(archives, monkeypatch):
+    pytest.importorskip("sb3_contrib")
+    monkeypatch.syspath_prepend(ROOT / "docs" / "examples")
+    for agent in set.union(*(agents for _, agents in archives.values())):
+        load_agent_class(agent)
+
+
+def test_every_archive_has_a_command(archives):
+    page = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+    [commands] = re.findall(r"^## Records\n(.*?)^## ", page, re.DOTALL | re.MULTILINE)
+    training = {path.name.removesuffix(".tar.xz") for path in (RECORDS / "training").glob("*.tar.xz")}
+    named = set(re.findall(r"(?:results|runs)/([\w-]+)", commands))
+    assert {*archives, *training} - named == set()
+
+
+@pytest.mark.parametrize("page", DOCS)
+def test_a_table_of_numbers_has_a_command_in_its_section(page):
+    text = GENERATED.sub("", (ROOT / page).read_text(encoding="utf-8"))
+    for section in re.split(r"^#+ ", text, flags=re.MULTILINE):
+        for table in re.findall(r"(?:^\|.*\n)+", section, re.MULTILINE):
+            numbers = re.findall(r"(?<=\| )[-+]?\d*\.\d+[^|a-z]*(?= \|)", table)
+            if len(numbers) > 5 and not table.startswith(CHOSEN):
+                assert COMMAND.search(section), table
 
 
 def test_an_archive_holds_the_evaluation_that_was_kept(tmp_path):

@@ -5,19 +5,21 @@ docs/agents/mmn.md describes the training, and how it departs from the paper.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
-from typing import ClassVar
+import pathlib
+from typing import ClassVar, Self
 
 import numpy as np
 import torch
 
-from mazebench.agent import Inputs, Observation
+from mazebench.agent import Inputs, Interface, Observation
 from mazebench.tasks.context import START
 
 from ..common.actor import ActorState, NetworkAgent, acting
 from ..common.layers import in_batches, marked_position, state_features
 from .hypermodel import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork
-from .mmn_config import MMNConfig
+from .mmn_config import MMNConfig, MMNEvalConfig
 from .model_learner import MMNLearner
 from .search_policy import plan
 
@@ -32,9 +34,26 @@ class MMN(NetworkAgent):
     needs_shown: ClassVar[tuple[str, ...]] = ("map", "goal")
     default_config: ClassVar[MMNConfig] = MMNConfig()
     learner_class: ClassVar[type[MMNLearner]] = MMNLearner
+    eval_config: ClassVar[MMNEvalConfig] = MMNEvalConfig()
     learns_on_gpu = True
     config: MMNConfig
     network: MMNNetwork
+
+    @classmethod
+    def build(
+        cls,
+        interface: Interface,
+        *,
+        seed: int = 0,
+        checkpoint: pathlib.Path | None = None,
+        config: MMNEvalConfig | None = None,
+        folder: pathlib.Path | None = None,
+    ) -> Self:
+        """Returns the agent of a checkpoint, as `NetworkAgent.build` does, with an evaluation's own search."""
+        agent = super().build(interface, seed=seed, checkpoint=checkpoint)
+        if config is not None and config.num_eval_simulations is not None:
+            agent.config = dataclasses.replace(agent.config, num_eval_simulations=config.num_eval_simulations)
+        return agent
 
     @classmethod
     def make_network(cls, config: MMNConfig, context_size: int) -> MMNNetwork:

@@ -7,10 +7,20 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval
 
+from mazebench.agent import AgentConfig
 from mazebench.errors import InputError
 from mazebench.options import Options
 
 from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Size, Steps, Updates, check_rows
+
+_Simulations = Annotated[int, Interval(ge=0, le=1000)]  # of a search
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MMNEvalConfig(AgentConfig):
+    """The values that an evaluation may set."""
+
+    num_eval_simulations: _Simulations | None = None  # None: as many as the config of the checkpoint says
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -35,8 +45,8 @@ class MMNConfig(Options):
     longest_value: Length = 100  # values lie in [-this, 0]; bounds the values of goals out of reach by a timeout
 
     # Search
-    num_simulations: Annotated[int, Interval(ge=0, le=1000)] = 8  # in training
-    num_eval_simulations: Annotated[int, Interval(ge=0, le=1000)] = 64  # in evaluation; search improves on the policy
+    num_simulations: _Simulations = 8  # in training
+    num_eval_simulations: _Simulations = 64  # in evaluation; search improves on the policy
     value_scale: Factor = 0.1  # Gumbel's c_scale: with maxvisit_init, values weigh one to two nats a step
     maxvisit_init: Factor = 10.0  # Gumbel's c_visit
 

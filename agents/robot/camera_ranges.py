@@ -100,10 +100,10 @@ class CameraRanges:
                 f"height, offset and pitch, found {camera}"
             )
         self._rays = rays_in_view(camera.fov)
-        self._network = RangeNetwork(len(self._rays))
+        self.network = RangeNetwork(len(self._rays))
         shipped = resources.files("mazebench_assets.checkpoints") / f"ranges-{camera.fov:g}.safetensors"
         path = pathlib.Path(str(shipped))
-        load_into(path, self._network, load_checkpoint(path, NAME)[0])
+        load_into(path, self.network, load_checkpoint(path, NAME)[0])
 
     def beams(self, cells_per_metre: float) -> Beams:
         """Returns the beam model of these ranges, whose errors grow with the square of the range."""
@@ -117,7 +117,7 @@ class CameraRanges:
         Only pictures that are `chosen` (`[B]` bool) are read.
         """
         rows = np.arange(len(pictures)) if chosen is None else np.flatnonzero(chosen)
-        ranges, scales = self._network.read(pictures[rows])
+        ranges, scales = self.network.read(pictures[rows])
         is_far = 1 / ranges + _FAR_SCALES * scales / ranges**2 < 1 / (MAX_RANGE - 0.1)
         found = np.full((len(pictures), NUM_RAYS), np.nan)
         found[np.ix_(rows, self._rays)] = np.where(is_far, MAX_RANGE, np.where(scales > SURE, np.nan, ranges))

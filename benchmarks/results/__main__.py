@@ -26,7 +26,7 @@ match sys.argv[1:]:
     case []:
         kept = read_kept(RECORDS)
         for page in PAGES:
-            (ROOT / page).write_bytes(with_tables((ROOT / page).read_text("utf-8"), kept).encode())
+            (ROOT / page).write_bytes(with_tables(page, (ROOT / page).read_text("utf-8"), kept).encode())
         for name, figure in figures(kept).items():
             (ROOT / f"docs/images/{name}.svg").write_bytes(to_svg(figure))
     case ["keep", *folders]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import pathlib
 import shutil
 import tarfile
 import tempfile
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import pandas as pd
 from mazebench_agents.common.checkpoint import AGENT_FILE
@@ -33,8 +33,8 @@ WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest
 RECALL = "recall"
 RECALL_AGENTS = ("navigator", "neural-planner")
 RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
-# In records: the navigator that was told all walls once it saw one on its path. It played `rebuilt` only.
-TOLD = "benchmarks.ceilings:ToldNavigator"
+LLM_DEV = "llm-dev"  # the archive of the suite on `dev`, whose parts are named as those of `llm`
+TOLD = "navigator-told"  # played `rebuilt` only
 # The settings whose maps lie as the mazes do, with the same doors moved: those with a true pose and registration.
 _REGISTERED = {
     "building": ("building-1", "building-1", "building-1"),
@@ -47,7 +47,11 @@ SUCCESS = "success_rate_"  # begins the names of success rates in what training 
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
 # Of records.
-_COLUMNS = ["episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked", "leg", "after_miss"]
+_COLUMNS = [
+    "episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked", "leg", "after_miss", "notes",
+]  # fmt: skip
+# Archives of evaluations with switches of their own, in folders ROW/SETTING: the agent is called ARCHIVE/ROW.
+_SWITCHED = ("map-policy", "mmn-search")
 # Archives whose agents have another name than their evaluations.
 _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",
@@ -68,19 +72,23 @@ def ceilings(track: str, level: int) -> dict[str, tuple[str, str]]:
     }
 
 
-class Kept(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Kept:
     """The kept evaluations and training runs."""
 
     # A line for each episode of an agent in a setting (its index), which is a part of a suite, by a checkpoint (`run`).
     episodes: pd.DataFrame
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
     training: dict[str, list[pd.DataFrame]]  # what training runs logged, by name of their archive
+    read: set[str] = dataclasses.field(default_factory=set)  # the archives that a table was made from so far
 
     def of(self, agent: str, setting: str) -> pd.DataFrame:
         """Returns the episodes of an agent in a setting: those of its training runs where several are kept."""
         found = self.episodes.loc[agent, setting]
         runs = found[found.archive == _RUNS]
-        return found if runs.empty else runs
+        found = found if runs.empty else runs
+        self.read.update(found.archive)
+        return found
 
     def on_tracks(self, agent: str) -> Iterator[tuple[str, int, pd.DataFrame]]:
         """Yields the tracks and levels on which an agent was evaluated, with its episodes there."""
@@ -94,6 +102,7 @@ class Kept(NamedTuple):
         The index has millions of agent steps, rounded to a tenth.
         """
         runs = []
+        self.read.add(f"{_TRAINING}/{archive}")
         for lines in self.training[archive]:
             lines = lines[lines.filter(like=SUCCESS).notna().any(axis=1)]
             lines = lines.set_index((lines.env_steps / 1e6).round(1))
@@ -127,12 +136,14 @@ def read_kept(folder: pathlib.Path) -> Kept:
         # The evaluations of the paper's protocol as the report reads them, and the episodes of all evaluations.
         for path in sorted(unpacked.rglob(SUMMARY)):
             result = load_result(path.parent)
-            summary, archive = result.summary, path.relative_to(unpacked).parts[0]
+            summary, (archive, *folders) = result.summary, path.parent.relative_to(unpacked).parts
             if summary.suite == PAPER:
                 paper.append(reported(result))
             agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
-            if archive == RECALL:  # whose agents are in other archives, too
-                setting = f"{setting}-{RECALL}"
+            if archive in (RECALL, LLM_DEV):  # whose agents played settings of these names in other archives, too
+                setting = f"{setting}-{archive}"
+            if archive in _SWITCHED:
+                agent, setting = f"{archive}/{folders[0]}", folders[1]
             if archive == _RUNS:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import os
 import pathlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,6 +17,7 @@ import pandas as pd
 from scipy import stats
 
 from benchmarks.results.kept import (
+    LLM_DEV,
     LOCAL,
     ON_TIME_2,
     ON_TIME_125,
@@ -40,20 +42,22 @@ ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
 PAGES = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments")),
-    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner")),
+    *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
+    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
     *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
 )
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
+_SOURCE = "Records: "  # begins the line below a table that names its archives
 _BLOCK = re.compile(
-    r"(<!-- table: ([^\n]+) -->\n)(?:\|[^\n]*\n)*(?:\n" + re.escape(SATURATED) + r"[^\n]*\n)?(<!-- end of table -->\n)"
+    r"(<!-- table: ([^\n]+) -->\n)(?:\|[^\n]*\n)*"
+    rf"(?:\n(?:{re.escape(SATURATED)}|{_SOURCE})[^\n]*\n)*(<!-- end of table -->\n)"
 )
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
 _KINDS = (*KNOWN, *NOVEL)
-_WITHOUT_MEMORY = "benchmarks.no_memory:NavigatorWithoutMemory"  # in records: began each leg as if it were the first
+_WITHOUT_MEMORY = "navigator-without-memory"
 
 _TRAINED = {
     "mmn": "`mmn`",
@@ -149,23 +153,39 @@ _ROWS = {
     "dqn": "`dqn`, learned, no map",
     "random": "`random`",
 }
+# Rows of tables of one evaluation each: agents and settings, by what a table calls them.
+_MAP_POLICY = {
+    f"`{track}` {level}, `{look}`": (f"map-policy/{look}", f"{track}-{level}")
+    for track, level, look in (
+        ("building", 1, "plain"), ("building", 1, "varied"), *(("rebuilt", level, "plain") for level in LEVELS)
+    )
+}  # fmt: skip
+_IN_WORDS = ("building-1", "rebuilt-2", "adrift-1", "adrift-2")  # the settings of the suites `llm` and `llm-dev`
+# The numbers of simulations of mmn in evaluation.
+_SEARCHES = {str(number): ("local-13", f"mmn-search/simulations-{number}") for number in (0, 64)}
+_SEARCHES["64 - 0"] = (*_SEARCHES["64"], _SEARCHES["0"][1])
 
 
-def with_tables(text: str, kept: Kept) -> str:
-    """Returns a page with its tables made from the records.
+def with_tables(page: str, text: str, kept: Kept) -> str:
+    """Returns the text of a page with its tables made from the records, each with the names of its archives.
 
     A table is one of `TABLES`, or one of the report of the suite `paper`, as "paper local-13 spl".
     """
+    commands = os.path.relpath("docs/protocol.md", pathlib.PurePath(page).parent) + "#records"
 
     def make(block: re.Match[str]) -> str:
         name, *of_report = block[2].split()
-        return block[1] + (report_table(kept, *of_report) if name == PAPER else TABLES[name](kept)) + block[3]
+        kept.read.clear()
+        table = report_table(kept, *of_report) if name == PAPER else TABLES[name](kept)
+        archives = ", ".join(f"`{name}`" for name in sorted(kept.read))
+        return f"{block[1]}{table}\n{_SOURCE}{archives} ([commands]({commands})).\n{block[3]}"
 
     return _BLOCK.sub(make, text)
 
 
 def report_table(kept: Kept, name: str, metric: str) -> str:
     """Returns a metric of a table of the report of the suite `paper`; a sentence has the agents that saturate it."""
+    kept.read.add(PAPER)
     table = kept.report[name]
     values = table.values[table.values.metric == metric]
     highest = values.groupby("column", observed=True).filter(
@@ -189,6 +209,32 @@ def by_distance(head: str, lines: Mapping[str, Sequence[str]], metric: str, at: 
         cells = [_interval(metric, *(own[own.distance == distance] for own in agents)) for distance in at]
         rows.append([text, ", ".join(str(own.run.nunique()) for own in agents), *cells])
     return format_table([head, "runs", *map(str, at)], rows)
+
+
+def by_row(head: str, rows: Mapping[str, tuple[str, str]], metrics: Sequence[str], kept: Kept) -> str:
+    """Returns the means of metrics of an agent in a setting in each row, and the number of its episodes."""
+    lines = [
+        [text, str(len(own := kept.of(agent, setting))), *(_interval(metric, own) for metric in metrics)]
+        for text, (agent, setting) in rows.items()
+    ]
+    return format_table([head, "episodes", *(METRICS[metric] for metric in metrics)], lines)
+
+
+def plans_in_words(kept: Kept) -> str:
+    """Returns on-time rates of agents on the suite `llm-dev`, also where the path on the map is blocked."""
+    rows, header = [], ["agent"]
+    for agent in ("llm-bfs", "llm-told", "llm-hope", "navigator"):
+        played = {name: kept.of(agent, f"{name}-words-{LLM_DEV}") for name in _IN_WORDS}
+        cells, header = [f"`{agent}`"], ["agent"]
+        for name, own in played.items():
+            cells.append(_number(own[ON_TIME_125].mean()))
+            header.append(f"`{name.replace('-', '` ')}")
+            if own.blocked.any():
+                cells.append(_number(own[own.blocked][ON_TIME_125].mean()))
+                header.append("its blocked")
+        answers = pd.concat(played.values()).notes.dropna().map(lambda notes: notes["decisions"])
+        rows.append([*cells, f"{answers.mean():.1f}" if len(answers) else ""])
+    return format_table([*header, "answers per episode"], rows)
 
 
 def mah_curve(kept: Kept) -> str:
@@ -401,6 +447,9 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-navigator": lambda kept: by_track(
         {metric.title: ("navigator", metric.name, _KINDS) for metric in (SUCCESS_RATE, *ON_TIMES, SPL)}, kept
     ),
+    "map-policy": lambda kept: by_row("setting", _MAP_POLICY, ("success_rate", ON_TIME_125, ON_TIME_2), kept),
+    "mmn-search": lambda kept: by_distance("simulations", _SEARCHES, "success_rate", (6, 8, 10, 12), kept),
+    LLM_DEV: plans_in_words,
     "tracks-navigator-kinds": lambda kept: by_track(
         {f"`{kind}`": ("navigator", ON_TIME_125, (kind,)) for kind in _KINDS},
         kept,

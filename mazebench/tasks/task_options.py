@@ -46,7 +46,6 @@ NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
 _NOISE = (*NOISE_OF_SENSORS, *(name for name in OF_OPTION if name not in PERTURBATIONS))
-_RETIRED = (("textures", False), ("walls", "filled"))  # options of earlier versions, and the values that said nothing
 
 
 def _as_mazes(mazes: Any) -> Any:
@@ -235,12 +234,12 @@ class TaskOptions(AllSensorOptions, ReadOptions):
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Self:
-        """Returns the options of which `to_json` returned the content, here or in an earlier version.
+        """Returns the options of which `to_json` returned the content.
 
         Raises:
           InputError: if there is no such option, or a value is not allowed.
         """
-        return cls.of({name: value for name, value in content.items() if (name, value) not in _RETIRED})
+        return cls.of(content)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""

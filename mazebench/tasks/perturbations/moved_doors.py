@@ -14,7 +14,7 @@ from mazebench.tasks.perturbations.perturbation import Of, Perturbation, ShownMa
 from mazebench.tasks.streams import Stream
 
 # How many doors of a maze of 31 x 31 cells move, by kind, so that so many per cent of the shortest paths on the map are
-# blocked in the maze; counted on 500 mazes of each kind that are in no split.
+# blocked in the maze; `python -m benchmarks.measures doors` counts it on mazes that are in no split.
 SWAPS_BY_PERCENT = {
     "dfs": {45: 9, 70: 18, 85: 29},
     "house": {45: 3, 70: 7, 85: 12},
