@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.kinds.kind import largest_area
-from mazebench.maps.maze import Maze
+from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze
@@ -152,6 +152,15 @@ def test_a_jpeg_is_turned_upright_when_the_camera_was_held_sideways(maze):
     # One entry of a little-endian TIFF directory: orientation (0x0112) 6, "turn right to see it upright".
     exif = b"Exif\0\0II*\0" + struct.pack("<IHHHIII", 8, 1, 0x0112, 3, 1, 6, 0)
     assert read_bytes(content[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + content[2:]) == maze
+
+
+@pytest.mark.parametrize("side", [150, 131, 67])
+def test_a_picture_with_soft_edges_is_read_by_its_number_of_cells(maze, side):
+    image = cv2.resize(blocks(maze.walls, 17), (side, side), interpolation=cv2.INTER_CUBIC)
+    assert maze_from_image(cv2.GaussianBlur(image, (0, 0), 0.8), 13) == maze
+    for size in (None, 12, 14):
+        with pytest.raises(MazeError, match="expected dark walls on a light ground and each cell as a block"):
+            maze_from_image(image, size)
 
 
 MAZE = generate("dfs", 13, np.random.default_rng(0))
