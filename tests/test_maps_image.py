@@ -17,7 +17,7 @@ from mazebench.maps.kinds.kind import largest_area
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.pictures import draw_maze
+from mazebench.maps.pictures import draw_grid, draw_maze
 from mazebench.maps.readers.image import grid_of_image
 from mazebench.maps.readers.occupancy_grid import locate_maze
 
@@ -70,7 +70,7 @@ def test_drawing_is_read_back_for_any_maze_and_scale(seed, size, cell_pixels):
 
 def test_drawing_marks_start_goal_and_path_when_given(maze):
     path = np.array([[1.5, 11.5], [1.5, 10.5], [11.5, 10.5], [11.5, 1.5]])
-    image = draw_maze(maze, 16, start=(1, 1), goal=(11, 11), path=path).astype(int)
+    image = draw_grid(maze.walls, 16, start=(1, 1), goal=(11, 11), path=path).astype(int)
     red, green, blue = image[1 * 16 + 8, 1 * 16 + 8]
     assert green > max(red, blue)
     red, green, blue = image[11 * 16 + 8, 11 * 16 + 8]

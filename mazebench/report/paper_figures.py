@@ -18,6 +18,7 @@ from mazebench.maps.maze import cell_to_point
 from mazebench.report.episodes import ReportedResult, at_common_distances
 from mazebench.report.figures import STYLE, WIDTH, make_grid, set_ticks
 from mazebench.report.tables import DEFAULT_LANDMARK_DISTANCE, note_on_levels, perturbed_groups
+from mazebench.results.naming import described
 
 # Without the palest yellow, which is invisible on white; the page has the same.
 TIME_COLORS = ListedColormap(mpl.colormaps["plasma"](np.linspace(0, 0.92, 32)))
@@ -97,7 +98,7 @@ def _paths(name: str, episodes: pd.DataFrame, first: Sequence[str]) -> list[Draw
     everyones = found[found.agents == found.agents.max()].sort_values("reached", key=_from_half, kind="stable")
     trials = sorted(everyones.drop_duplicates("maze").index[:_MAX_COLUMNS])
 
-    title = f"Paths: {shown.setting.iloc[0]}"
+    title = f"Paths: {described(shown.setting.iloc[0])}"
     width = max(len(trials), 3) * WIDTH / _MAX_COLUMNS
     figure = Figure(figsize=(width, 0.5 + len(labels) * (WIDTH / _MAX_COLUMNS + 0.2)), layout="constrained")
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
