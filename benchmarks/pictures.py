@@ -22,12 +22,12 @@ from mazebench.agent import Inputs
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
+from mazebench.film import run_episode
 from mazebench.maps import colors
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, path_through_walls
 from mazebench.maps.pictures import draw_grid, draw_rays
-from mazebench.play.film import run_episode
 from mazebench.report.page import lay_on_first_pose
 from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result

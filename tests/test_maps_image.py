@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.kinds.kind import largest_area
-from mazebench.maps.maze import Maze
+from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.pictures import draw_maze
+from mazebench.maps.pictures import draw_grid, draw_maze
 from mazebench.maps.readers.image import grid_of_image
 from mazebench.maps.readers.occupancy_grid import locate_maze
 
@@ -70,7 +70,7 @@ def test_drawing_is_read_back_for_any_maze_and_scale(seed, size, cell_pixels):
 
 def test_drawing_marks_start_goal_and_path_when_given(maze):
     path = np.array([[1.5, 11.5], [1.5, 10.5], [11.5, 10.5], [11.5, 1.5]])
-    image = draw_maze(maze, 16, start=(1, 1), goal=(11, 11), path=path).astype(int)
+    image = draw_grid(maze.walls, 16, start=(1, 1), goal=(11, 11), path=path).astype(int)
     red, green, blue = image[1 * 16 + 8, 1 * 16 + 8]
     assert green > max(red, blue)
     red, green, blue = image[11 * 16 + 8, 11 * 16 + 8]
@@ -152,6 +152,15 @@ def test_a_jpeg_is_turned_upright_when_the_camera_was_held_sideways(maze):
     # One entry of a little-endian TIFF directory: orientation (0x0112) 6, "turn right to see it upright".
     exif = b"Exif\0\0II*\0" + struct.pack("<IHHHIII", 8, 1, 0x0112, 3, 1, 6, 0)
     assert read_bytes(content[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + content[2:]) == maze
+
+
+@pytest.mark.parametrize("side", [150, 131, 67])
+def test_a_picture_with_soft_edges_is_read_by_its_number_of_cells(maze, side):
+    image = cv2.resize(blocks(maze.walls, 17), (side, side), interpolation=cv2.INTER_CUBIC)
+    assert maze_from_image(cv2.GaussianBlur(image, (0, 0), 0.8), 13) == maze
+    for size in (None, 12, 14):
+        with pytest.raises(MazeError, match="expected dark walls on a light ground and each cell as a block"):
+            maze_from_image(image, size)
 
 
 MAZE = generate("dfs", 13, np.random.default_rng(0))

@@ -310,6 +310,28 @@ class TestFloorPlan:
         assert not maze.is_free((3, 15))
         assert maze.size == 21
 
+    @pytest.mark.parametrize("margin", [0, 36])
+    @pytest.mark.parametrize("kind", ["house", "dfs"])
+    def test_a_plan_with_soft_edges_has_the_walls_of_its_maze(self, kind, margin, tmp_path):
+        walls = generate(kind, 21, np.random.default_rng(0)).walls
+        paper = np.pad(
+            np.where(walls, 0, 255).astype(np.uint8).repeat(18, 0).repeat(18, 1), margin, constant_values=255
+        )
+        plans = [cv2.GaussianBlur(paper, (0, 0), sigma) for sigma in (0.5, 0.8, 1.0, 1.2)]
+        halved = cv2.resize(paper, None, fx=1 / 9, fy=1 / 9, interpolation=cv2.INTER_AREA)
+        plans += [
+            cv2.resize(halved, None, fx=9, fy=9, interpolation=how) for how in (cv2.INTER_CUBIC, cv2.INTER_LINEAR)
+        ]
+        for plan in plans:
+            maze = read_maze(self.write(tmp_path, plan), pixel_size=0.03, cell_size=0.54)
+            np.testing.assert_array_equal(maze.walls, walls)
+
+    def test_thin_lines_of_a_blurred_plan_stay_closed(self, tmp_path):
+        plan = two_rooms()
+        plan[40:85, 101:103] = 0  # the door, closed by a line of 2 pixels
+        maze = read_maze(self.write(tmp_path, cv2.GaussianBlur(plan, (0, 0), 1.0)), pixel_size=0.02)
+        assert maze.walls[:, 5].all()
+
     def test_marks_in_colour_are_floor_and_gray_is_unknown(self, tmp_path):
         plan = cv2.cvtColor(two_rooms(), cv2.COLOR_GRAY2BGR)
         plan[45:55, 45:55] = (0, 0, 255)

@@ -187,17 +187,22 @@ class TestForms:
         assert escape_markdown("a|b <c> [x](y) `x`\ntwo *b*") == r"a\|b \<c\> \[x\](y) \`x\` two \*b\*"
 
 
+OF_PAPER = {f"{name}.csv" for name in ("violins-flip-hierarchical-13", "violins-noise-local-13", "paths-hierarchical")}
+
+
 class TestFiles:
     def test_every_table_and_figure_has_all_its_forms(self, report):
-        tables = {path.stem for path in (report / "tables").iterdir() if path.suffix == ".csv"}
+        tables = {path.stem for path in (report / "tables").iterdir() if path.suffix == ".md"}
         assert tables >= {"local-13", "local-15", "size-local", "hierarchical-13", "flip-hierarchical-13", "all"}
         assert "noise-local-13" in tables
         for folder, suffixes in (("tables", (".md", ".csv", ".tex")), ("figures", (".png", ".pdf"))):
             names = {path.name for path in (report / folder).iterdir()}
             stems = {name.removesuffix(suffixes[0]) for name in names if name.endswith(suffixes[0])}
-            assert names == {stem + suffix for stem in stems for suffix in suffixes}
+            assert names - OF_PAPER == {stem + suffix for stem in stems for suffix in suffixes}
         figures = {path.stem for path in (report / "figures").iterdir()}
-        assert figures == tables - {"all"}
+        assert figures == tables - {"all"} | {
+            *("violins-flip-hierarchical-13", "violins-noise-local-13", "paths-hierarchical"),
+        }
 
     def test_a_later_report_replaces_an_earlier_one(self, tmp_path):
         make_result(tmp_path / "a", "mah", num_mazes=1, record=False)

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import pandas as pd
+import pytest
 from made_results import make_result
+from matplotlib.colors import to_hex
+from matplotlib.image import imread
 
+from mazebench.maps import colors
 from mazebench.report.episodes import join_episodes, read_results
 from mazebench.report.figures import Panel, draw_panels, draw_table, save
+from mazebench.report.paper_figures import draw_paths, draw_violins
 from mazebench.report.tables import build_tables
 
 LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
@@ -47,3 +52,30 @@ def test_what_the_paper_printed_looks_like_no_agent(tmp_path):
     looks = {line.get_label(): (line.get_color(), line.get_marker()) for line in lines}
     assert list(looks) == [*labels, *(f"{agent} (paper)" for agent in ("MMN", "MAH", "DQN", "Random"))]
     assert len(set(looks.values())) == 8
+
+
+def test_violins_show_the_scores_of_each_level_and_their_mean(tmp_path):
+    make_result(tmp_path / "plain", "mah", num_mazes=3, record=False)
+    make_result(tmp_path / "noise", "mah", num_mazes=3, record=False, position_noise=0.5)
+    episodes = episodes_of(tmp_path)
+    [drawn] = draw_violins(episodes)
+    [axes] = drawn.figure.axes
+    assert (axes.get_title("left"), [text.get_text() for text in axes.get_xticklabels()]) == ("mah", ["0", "0.5"])
+    assert len(axes.collections) == 3  # two violins, and the means
+    means = episodes.groupby("position_noise").spl.mean().tolist()
+    assert drawn.values["mean"].tolist() == pytest.approx(means, abs=1e-4)
+    assert drawn.values[["agent", "strength", "count"]].values.tolist() == [["mah", 0.0, 6], ["mah", 0.5, 6]]
+
+
+def test_paths_are_of_hierarchical_navigation_with_a_row_for_each_agent(tmp_path):
+    for agent in ("mah", "mmn"):
+        make_result(tmp_path / agent / "routes", agent, "hierarchical", num_mazes=2)
+        make_result(tmp_path / agent / "flip", agent, "hierarchical", num_mazes=2, map_flip=0.2)
+        make_result(tmp_path / agent / "local", agent, num_mazes=2)
+    [drawn] = draw_paths(episodes_of(tmp_path))
+    assert [axes.get_ylabel() for axes in drawn.figure.axes if axes.get_ylabel()] == ["mmn", "mah"]
+    assert drawn.values.maze.tolist() == ["13-eval-00", "13-eval-00", "13-eval-01", "13-eval-01"]
+    save(drawn.figure, tmp_path / "figure")
+    pixels = imread(tmp_path / "figure.png")[..., :3]
+    for color in (colors.START, colors.GOAL):
+        assert (abs(pixels - color).max(axis=-1) < 0.01).sum() > 50, to_hex(color)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pathlib
+import runpy
+
 import hypothesis
 import numpy as np
 import pytest
@@ -159,3 +162,10 @@ class TestRunsAndMazes:
         found = runs_interval(self.RUNS, self.MAZES, constant)
         assert found.value == pytest.approx(alone.value - 0.5)
         assert runs_interval(constant, self.MAZES) == mean_interval(constant[0], self.MAZES)
+
+
+@pytest.mark.slow
+def test_two_cells_of_the_published_simulation_of_coverage():
+    found = runpy.run_path(str(pathlib.Path(__file__).parent.parent / "docs" / "examples" / "coverage.py"))
+    assert f"{found['of_one_run']('success', 48, 5, 0.2, 0.9, 2_000):.2f}" == "0.95"
+    assert f"{found['of_several_runs'](3, 1.0, 0.95, 2_000):.2f}" == "0.92"

@@ -21,6 +21,7 @@ from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import ON_TIMES, scores
 from mazebench.results.naming import order
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_result
+from mazebench.results.trajectories import TRAJECTORIES
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.training.run_folder import METRICS, checkpoints, read_metrics
@@ -42,6 +43,7 @@ _REGISTERED = {
     "adrift": ("rebuilt-2", "rebuilt-2", "rebuilt-3"),
     "rough": ("rebuilt-1", "rebuilt-2", "rebuilt-2"),
 }
+PATHS = "paper-paths"  # the archive of evaluations of `PAPER`'s settings whose paths are kept, too
 _SUFFIX = ".tar.xz"
 SUCCESS = "success_rate_"  # begins the names of success rates in what training runs logged
 _TRAINING = "training"  # the folder of archives of training runs
@@ -80,6 +82,9 @@ class Kept:
     episodes: pd.DataFrame
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
     training: dict[str, list[pd.DataFrame]]  # what training runs logged, by name of their archive
+    # The episodes of the suite `paper` as a report has them, and likewise those whose paths are kept.
+    paper: pd.DataFrame = dataclasses.field(default_factory=pd.DataFrame)
+    paths: pd.DataFrame = dataclasses.field(default_factory=pd.DataFrame)
     read: set[str] = dataclasses.field(default_factory=set)  # the archives that a table was made from so far
 
     def of(self, agent: str, setting: str) -> pd.DataFrame:
@@ -125,7 +130,7 @@ def estimate(metric: str, *agents: pd.DataFrame) -> Estimate:
 def read_kept(folder: pathlib.Path) -> Kept:
     """Returns what all archives of `folder` hold, and those of training runs in its folder `training`."""
     training: dict[str, list[pd.DataFrame]] = {}
-    paper, episodes = [], []
+    paper, paths, episodes = [], [], []
     with tempfile.TemporaryDirectory() as temporary:
         unpacked = pathlib.Path(temporary)
         for path in folder.rglob(f"*{_SUFFIX}"):
@@ -137,6 +142,9 @@ def read_kept(folder: pathlib.Path) -> Kept:
         for path in sorted(unpacked.rglob(SUMMARY)):
             result = load_result(path.parent)
             summary, (archive, *folders) = result.summary, path.parent.relative_to(unpacked).parts
+            if archive == PATHS:
+                paths.append(reported(result))
+                continue
             if summary.suite == PAPER:
                 paper.append(reported(result))
             agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
@@ -151,20 +159,25 @@ def read_kept(folder: pathlib.Path) -> Kept:
             lines[WORST_TENTH] = lines[ON_TIME_125].where(lines.maze.isin(rates.nsmallest(-(-len(rates) // 10)).index))
             run = (summary.provenance.checkpoint_sha256 or "")[:8]
             episodes.append(lines.assign(archive=archive, agent=agent, run=run, setting=setting))
-        tables = build_tables(join_episodes(sorted(paper, key=lambda each: order(each.setting))))
+    of_paper, of_paths = (join_episodes(sorted(each, key=lambda one: order(one.setting))) for each in (paper, paths))
+    tables = build_tables(of_paper)
     joined = pd.concat(episodes).astype({"oracle_steps": "Int64"}).set_index(["agent", "setting"])
-    return Kept(joined.sort_index(kind="stable"), {table.name: table for table in tables}, training)
+    return Kept(joined.sort_index(kind="stable"), {table.name: table for table in tables}, training, of_paper, of_paths)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
     """Writes an archive of the evaluations in `folder` into `records`, in the place of one of its name.
 
     A folder without any may hold training runs. Their configs, curves and last checkpoints go to `records/training`.
-    Equal contents give equal bytes.
+    Equal contents give equal bytes. Of the folder `PATHS`, paths are kept, too.
     """
     folder = folder.resolve()
     are_evaluations = any(folder.rglob(SUMMARY))
-    names = (CONFIG, EPISODES, SUMMARY, SUITE) if are_evaluations else (CONFIG, METRICS)
+    names = (
+        (CONFIG, EPISODES, SUMMARY, SUITE, *[TRAJECTORIES] * (folder.name == PATHS))
+        if are_evaluations
+        else (CONFIG, METRICS)
+    )
     paths = sorted(path for name in names for path in folder.rglob(name))
     paths += [last / AGENT_FILE for path in paths if path.name == METRICS for last in checkpoints(path.parent)[-1:]]
     if not paths:

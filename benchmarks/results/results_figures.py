@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.results.kept import LOCAL, ON_TIME_125, Kept, estimate
 from mazebench.report.figures import Panel, draw_panels, draw_table
+from mazebench.report.paper_figures import draw_paths, draw_violins
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 # Each line's place is its colour and marker, in all figures.
@@ -33,6 +34,7 @@ def figures(kept: Kept) -> dict[str, Figure]:
     local = kept.report[LOCAL]
     some = local.values.column.isin(["mmn", "mah", "mah-paper", "dqn", "random", "MMN (paper)"])  # miss some goals
     local = dataclasses.replace(local, values=local.values[some])
+    violins = kept.paper[kept.paper.agent.isin(["mmn", "mah", "planner"])]
     agents = ("navigator", "navigator without map", "navigator with the true pose")
     return {
         "map-worth": on_time("What the map is worth", {agent: (agent, (False, True)) for agent in agents}, kept),
@@ -45,6 +47,7 @@ def figures(kept: Kept) -> dict[str, Figure]:
         "wrong-maps": wrong_maps(kept),
         "model-and-search": model_and_search(kept),
         LOCAL: draw_table(local, _LOOKS),
+        **{drawn.name: drawn.figure for drawn in [*draw_violins(violins), *draw_paths(kept.paths)]},
     }
 
 

@@ -47,7 +47,7 @@ def render(
     result = load_result(results) if results else None
     task = result.summary.task if result else watched_task(values).options
     load_mujoco(renders=view not in (*_DRAWN, *task.sensors))
-    from mazebench.play import film
+    from mazebench import film
 
     if result and episode is not None:
         outcome = film.film_result(result, episode, out, view, pixels, **values)

@@ -50,7 +50,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     return read_located(path, size, **options).maze
 
 
-def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
+def read_mazes(path: str | pathlib.Path, size: int | None = None, **options: Any) -> tuple[Maze, ...]:
     """Reads the maze in a file, or the mazes in a folder's map files in the order of their names.
 
         >>> train = mazebench.make_vec("local", 64, mazes=mazebench.read_mazes("plans"))
@@ -60,12 +60,13 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
 
     Args:
       path: of the file or folder.
+      size: as `read_maze` takes it.
       **options: those of `mazebench.maps.maze_options.ReadOptions`.
 
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return tuple(read_maze(file, **options) for file in _files(pathlib.Path(path).expanduser()))
+    return tuple(read_maze(file, size, **options) for file in _files(pathlib.Path(path).expanduser()))
 
 
 def read_with_older(

@@ -24,29 +24,17 @@ _MOST_UNITS = 24  # cells a side; in larger mazes marks and paths are as large a
 _SUBPIXEL_BITS = 4  # cv2 draws at sixteenths of a pixel
 
 
-def draw_maze(
-    maze: Maze,
-    cell_pixels: int = 16,
-    start: Cell | None = None,
-    goal: Cell | None = None,
-    path: np.ndarray | None = None,
-) -> np.ndarray:
+def draw_maze(maze: Maze, cell_pixels: int = 16) -> np.ndarray:
     """Draws `maze` with near-black walls on white floor: `[H, W, 3]` uint8 RGB with H = W = N * cell_pixels.
 
-    A green disc marks `start`, a red one `goal`, each at least 3 % of the picture wide. `path` is `[T, 2]` points
-    (x, y) in metres, equally spaced in time; it is drawn as a line from blue (first) to orange (last).
-    `mazebench.read_maze` reads a drawing without markers exactly.
+    `mazebench.read_maze` reads it exactly.
 
     Raises:
-      InputError: if the picture would be larger than 8192 pixels a side or `path` is not finite points.
-      MazeError: if `start` or `goal` is not free.
+      InputError: if the picture would be larger than 8192 pixels a side.
     """
     if not 1 <= cell_pixels <= MAX_SIDE // maze.size:
         raise InputError(f"expected 1 to {MAX_SIDE // maze.size} pixels a cell for this maze, found {cell_pixels}")
-    for cell in (start, goal):
-        if cell is not None:
-            maze.require_free(cell)
-    return draw_grid(maze.walls, cell_pixels, start, goal, None if path is None else np.asarray(path) / maze.cell_size)
+    return draw_grid(maze.walls, cell_pixels)
 
 
 def draw_plan(maze: Maze, cell_pixels: int) -> np.ndarray:
@@ -66,8 +54,10 @@ def draw_grid(
     goal: Cell | None = None,
     path: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Draws any walls, such as those of a perturbed map, as `draw_maze` draws a maze, with a `path` in cells.
+    """Draws any walls, such as those of a perturbed map, as `draw_maze` draws a maze.
 
+    A green disc marks `start`, a red one `goal`, each at least 3 % of the picture wide. `path` is `[T, 2]` points
+    (x, y) in cells, equally spaced in time; it is drawn as a line from blue (first) to orange (last).
     Cells of `walls` (`[N, N]`) are bool, or shares of wall in [0, 1], which are drawn in shades between floor and wall.
 
     Raises:

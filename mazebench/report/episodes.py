@@ -104,9 +104,10 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
 def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
     """Returns the episodes of all results below one another.
 
-    It adds columns to those of `ReportedResult.episodes`: the `result`; the agent's `label` (ordered as `results`),
-    `agent` (its name) and `run`; the `setting` (ordered), its fields and perturbations, and its `mazes` in words; and
-    numbers of the maze and of the `trial`: episodes with one maze, start, goal and seed are one trial.
+    It adds columns to those of `ReportedResult.episodes`: the `result` and the `number` of the episode in it; the
+    agent's `label` (ordered as `results`), `agent` (its name) and `run`; the `setting` (ordered), its fields and
+    perturbations, and its `mazes` in words; and numbers of the maze and of the `trial`: episodes with one maze, start,
+    goal and seed are one trial.
     """
     labels = list(dict.fromkeys(result.label for result in results))
     settings = sorted({result.setting for result in results}, key=order)
@@ -114,6 +115,7 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
         [
             result.episodes.assign(
                 result=result,
+                number=range(len(result.episodes)),
                 label=pd.Categorical([result.label] * len(result.episodes), labels, ordered=True),
                 agent=result.summary.who,
                 run=result.run,

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from mazebench.report.table import Table
 from mazebench.results.metrics import HEADLINE, SPL, SPL_GRID
 
-_WIDTH = 7.0  # inches, of a page's text
+WIDTH = 7.0  # inches, of a page's text
 _HEIGHT = 2.2  # inches, of a panel
 # Okabe and Ito's colours, told apart with any colour vision; without their yellow, which is faint on white, and with a
 # dark grey for their black, which is for what the paper printed.
@@ -25,7 +25,7 @@ _PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#
 _MARKERS, _DASHES = "os^Dv<>PXp*h", ("-", (0, (3.7, 1.6)), (0, (6.4, 1.6, 1.0, 1.6)))
 # Of what the paper printed: one colour that no agent has, and strokes where agents have areas.
 _PAPER_MARKERS = {"MMN (paper)": "x", "MAH (paper)": "+", "DQN (paper)": "1", "Random (paper)": "2"}
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 8.5,
     "axes.titlesize": 9,
     "axes.titlelocation": "left",
@@ -76,7 +76,7 @@ def draw_table(table: Table, labels: Sequence[str]) -> Figure:
     return draw_panels(table.title, panels, labels)
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def draw_panels(
     title: str,
     panels: Sequence[Panel],
@@ -89,7 +89,7 @@ def draw_panels(
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
     some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
-    figure, grid, num_columns = _make_grid(title, [panel.title for panel in panels], _HEIGHT)
+    figure, grid, num_columns = make_grid(title, [panel.title for panel in panels], _HEIGHT)
     for axes, panel in zip(grid, panels, strict=True):
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
@@ -100,14 +100,14 @@ def draw_panels(
         return figure
     handles = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     lines = [name.split("\n") for name in handles]
-    columns = int(np.clip(13 * _WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
+    columns = int(np.clip(13 * WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
     # The legend makes the figure higher, and leaves the panels as they are.
     figure.set_figheight(figure.get_figheight() + 0.16 * -(-len(lines) // columns) * max(map(len, lines)))
     figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns)
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def save(figure: Figure, path: pathlib.Path) -> None:
     """Writes PATH.png and PATH.pdf; the same content gives the same bytes."""
     figure.draw_without_rendering()
@@ -116,7 +116,7 @@ def save(figure: Figure, path: pathlib.Path) -> None:
     figure.savefig(f"{path}.pdf", metadata=dict.fromkeys(("CreationDate", "Producer", "Creator")))
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def to_svg(figure: Figure) -> bytes:
     """Returns a figure as the content of an SVG file."""
     content = io.BytesIO()
@@ -124,11 +124,11 @@ def to_svg(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes], int]:
+def make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes], int]:
     """Returns a figure, axes in it with these titles, as many beside one another as fit, and how many that is."""
     num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
     num_rows = -(-len(titles) // num_columns)
-    width = _WIDTH if num_columns > 1 else _WIDTH / 1.6
+    width = WIDTH if num_columns > 1 else WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]
     title = textwrap.fill(title, int(13 * width))
     height += 0.16 * max(text.count("\n") for text in titles)
@@ -154,7 +154,7 @@ def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:
             axes.vlines(x, own.low95, own.high95, color=look["color"], linewidth=0.9)
     axes.set_xlabel(panel.x_name)
     axes.set(ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
-    _set_ticks(axes, panel.ticks)
+    set_ticks(axes, panel.ticks)
     margin = 0.4 if panel.is_curve else step / 2
     axes.set_xlim(ticks[0] - margin, ticks[-1] + margin)
 
@@ -173,7 +173,7 @@ def _name_lines(axes: Axes, panel: Panel, labels: Sequence[str], names: Mapping[
         axes.text(1.03, middle, text, transform=axes.get_yaxis_transform(), **look)
 
 
-def _set_ticks(axes: Axes, ticks: Mapping[float, str]) -> None:
+def set_ticks(axes: Axes, ticks: Mapping[float, str]) -> None:
     """Shows at most eight of the ticks, so that their texts do not meet."""
     shown = list(ticks)[:: -(-len(ticks) // 8)]
     axes.set_xticks(shown, [ticks[x] for x in shown])

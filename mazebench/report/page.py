@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -24,14 +24,13 @@ from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
 from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import to_svg
+from mazebench.report.paper_figures import TIME_COLORS, Drawn
 from mazebench.report.table import Table
 from mazebench.results import naming
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
 from mazebench.world.ray_casting import NUM_RAYS
 
-# Without the palest yellow, which is invisible on white.
-_TIME_COLORS = mpl.colormaps["plasma"](np.linspace(0, 0.92, 32))
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
 
@@ -41,12 +40,13 @@ def build_page(
     head: str,
     tables: Sequence[Table],
     figures: Mapping[str, Figure],
+    of_paper: Sequence[Drawn],
     provenance: pd.DataFrame,
     warnings: Sequence[str],
 ) -> str:
     """Returns the page as HTML; text from results is escaped in it, or stands in it as JSON and base64.
 
-    `head` describes the results in a line. `figures` are those of tables, by their names.
+    `head` describes the results in a line. `figures` are those of tables, by their names, and `of_paper` others.
     """
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
@@ -56,9 +56,13 @@ def build_page(
         parts = (json.dumps(each, separators=(",", ":")) for each in (_trials(result), _outcomes(result)))
         packed = (_base64(zlib.compress(part.encode("ascii"), 9)) for part in parts)
         used.append([columns.setdefault(each, len(columns)) for each in packed])
-    # Tables with their figures, then those without one.
-    sections = [(table, _base64(to_svg(figures[table.name]))) for table in tables if table.name in figures]
-    sections += [(table, "") for table in tables if table.name not in figures]
+    # Tables with their figures, the other figures, then tables without one. Each has a title, a note and values.
+    drawn = [(table, figures[table.name]) for table in tables if table.name in figures]
+    sections: list[tuple[Table | Drawn, str, Iterable[pd.DataFrame]]] = [
+        (table, _base64(to_svg(figure)), map(table.wide, table.metrics)) for table, figure in drawn
+    ]
+    sections += [(each, _base64(to_svg(each.figure)), [each.values]) for each in of_paper]
+    sections += [(table, "", map(table.wide, table.metrics)) for table in tables if table.name not in figures]
     return jinja2.Template(_read("page.html"), autoescape=True).render(
         style=style,
         style_hash=_hash(style),
@@ -119,7 +123,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
         "settings": list(map(naming.described, settings)),
         "rays": NUM_RAYS,
         "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME},
-        "timeColors": [mpl.colors.to_hex(color) for color in _TIME_COLORS],
+        "timeColors": [mpl.colors.to_hex(color) for color in TIME_COLORS(range(32))],
         "mazes": [{"name": name, "walls": walls} for name, walls in mazes],
         "results": described,
         "first": results.index(first),

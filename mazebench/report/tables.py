@@ -20,7 +20,7 @@ from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS
 
-_DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
+DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 Rows = dict[str, pd.DataFrame]  # named groups of the episodes of all agents
 Printed = Mapping[str, Mapping[str, Mapping[int, float]]]  # the paper's values by agent, metric and row
 
@@ -75,7 +75,7 @@ def make_table(name: str, title: str, note: str, row_name: str, rows: Rows, pape
     return Table(name, title, note, row_name, make_values(lines, rows))
 
 
-def _perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yields each perturbation, the name of files on its levels in a setting, and the episodes of that setting.
 
     The column `strength` has that of the perturbation, also 0. Only agents that have results with the perturbation
@@ -87,12 +87,12 @@ def _perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, str, pd.Dat
         alone = alone.assign(strength=alone[perturbation])
         for (task, size, landmarks), group in alone.groupby(["task", "size", "landmark_distance"]):
             name = f"{perturbation.rpartition('_')[2]}-{task}-{size}"
-            name += f"-k{landmarks}" * (landmarks not in (0, _DEFAULT_LANDMARK_DISTANCE))
+            name += f"-k{landmarks}" * (landmarks not in (0, DEFAULT_LANDMARK_DISTANCE))
             if (group.strength > 0).any():
                 yield perturbation, name, group[group.label.isin(group.label[group.strength > 0])]
 
 
-def _note_on_levels(perturbation: str, episodes: pd.DataFrame) -> str:
+def note_on_levels(perturbation: str, episodes: pd.DataFrame) -> str:
     """Returns what the strength of a perturbation means, and which distances count."""
     distances = common_distances(episodes)
     counted = f"Distances {_format_distances(distances)}." if distances else ""
@@ -114,10 +114,10 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
         yield make_table(
             f"hierarchical-{size}", title, note, "landmark distance", rows, _printed("hierarchical", group)
         )
-    for perturbation, name, group in _perturbed_groups(episodes):
+    for perturbation, name, group in perturbed_groups(episodes):
         strength_name, (task, size) = perturbation.replace("_", " "), group[["task", "size"]].iloc[0]
         title = f"{strength_name.capitalize()}: {task}, {size} × {size}"
-        rows, note = _rows_by(group, "strength"), _note_on_levels(perturbation, group)
+        rows, note = _rows_by(group, "strength"), note_on_levels(perturbation, group)
         yield make_table(name, title, note, strength_name, rows)
         # The paper prints local navigation on warped maps by distance.
         if (perturbation, task) == ("map_warp", "local"):

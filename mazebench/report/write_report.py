@@ -13,6 +13,7 @@ from mazebench.errors import InputError, remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
 from mazebench.report.figures import draw_table, save
 from mazebench.report.page import build_page
+from mazebench.report.paper_figures import draw_paths, draw_violins
 from mazebench.report.tables import build_tables
 from mazebench.storage.files import make_folder, writing_to
 
@@ -43,6 +44,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
     figures = {table.name: draw_table(table, labels) for table in tables if table.x}
+    of_paper = [*draw_violins(episodes), *draw_paths(episodes)]
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
         f"Benchmark {benchmarks}; {', '.join(labels)}; {counted(len(episodes), 'episode')} in "
@@ -54,7 +56,10 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
                 (out / TABLES / f"{table.name}{suffix}").write_bytes(text.encode(errors="replace"))
         for name, figure in figures.items():
             save(figure, out / FIGURES / name)
-        page = build_page(results, head, tables, figures, provenance_of(results), notes)
+        for drawn in of_paper:
+            save(drawn.figure, out / FIGURES / drawn.name)
+            drawn.values.to_csv(out / TABLES / f"{drawn.name}.csv", index=False)
+        page = build_page(results, head, tables, figures, of_paper, provenance_of(results), notes)
         (out / PAGE).write_bytes(page.encode(errors="replace"))  # names of folders need not be legal Unicode
     return results
 

@@ -226,7 +226,7 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
     if asked.shown is None:
-        mazes = read_mazes(mazes, **dataclasses.asdict(asked.reading))
+        mazes = read_mazes(mazes, asked.size, **dataclasses.asdict(asked.reading))
     else:
         mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
     kept = _playable(mazes, functools.partial(_check_maze, asked))

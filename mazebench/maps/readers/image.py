@@ -28,6 +28,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "GIF", "PPM", "TIFF", "WEBP")
 _MIN_SIDE = 3  # cells on the shorter side: wall, floor, wall
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
+_DARK_CELL = 0.35  # of the lightest shade, up to which a cell with soft edges is dark; as much below it, it is light
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
 
 
@@ -70,8 +71,8 @@ def _as_array(picture: PIL.Image.Image) -> np.ndarray:
 def grid_of_image(image: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
     """Returns the cells of a pixel map, in which each cell is a block of k x k pixels, k >= 1; dark is wall.
 
-    A map of R x C cells that is not square is padded with wall, see `locate_maze`. Marks in colour on a map with gray
-    walls are floor, and so is what is transparent.
+    Where `size` is given, edges may be soft and k may be a fraction. A map of R x C cells that is not square is padded
+    with wall, see `locate_maze`. Marks in colour on a map with gray walls are floor, and so is what is transparent.
 
     Args:
       image: `[H, W]` gray, `[H, W, 3]` RGB or `[H, W, 4]` RGB and opacity, uint8 or uint16.
@@ -84,11 +85,15 @@ def grid_of_image(image: np.ndarray, size: int | None, name: str) -> OccupancyGr
     """
     if size is not None and not MIN_SIZE <= size <= MAX_CHOSEN_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_CHOSEN_SIZE} cells, found {size}")
-    walls = _pixel_map(to_gray(image, name), size)
+    gray = to_gray(image, name)
+    walls = _pixel_map(gray, size)
+    if walls is None and size is not None:
+        walls = _cells_of(gray, size)
     if walls is None:
         raise MazeError(
             f"{name}: expected dark walls on a light ground and each cell as a block of pixels"
-            f"{'' if size is None else f', {size} cells on the longer side'}; a drawn or scanned plan needs "
+            f"{'; where edges are soft, --size is the number of cells on the longer side' if size is None else ''}"
+            f"{f', {size} cells on the longer side' if size else ''}; a drawn or scanned plan needs "
             "--pixel-size, its metres a pixel"
         )
     require_closed_border(walls, name)
@@ -158,6 +163,15 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
     walls = dark[::cell, ::cell]
     has_margin = not (walls[0].any() or walls[-1].any() or walls[:, 0].any() or walls[:, -1].any())
     return None if has_margin else walls
+
+
+def _cells_of(gray: np.ndarray, size: int) -> np.ndarray | None:
+    """Returns the walls of a picture with `size` cells on the longer side; None if one is neither dark nor light."""
+    height, width = np.maximum(np.round(np.array(gray.shape) * size / max(gray.shape)).astype(int), _MIN_SIDE).tolist()
+    lightest, darkest = float(gray.max()), float(gray.min())
+    shades = cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA).astype(float)
+    shares = (shades - darkest) / max(lightest - darkest, 1.0)
+    return None if ((shares > _DARK_CELL) & (shares < 1 - _DARK_CELL)).any() else shares <= _DARK_CELL
 
 
 def _block(picture: np.ndarray) -> int:

@@ -34,6 +34,9 @@ _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver wri
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
 _LEAST_INSIDE = 0.2  # share of a floor plan that is free inside of closed outer walls; less of it is a closed room
 _Share = Annotated[float, Interval(ge=0, le=1)]
+# Of a floor plan with soft edges: the most pixels of one, the shades of what is certainly wall, and the least
+# difference of shades across an edge's pixels, or between a thin line and what is around it.
+_SOFT, _DARK, _CONTRAST = 6, 51, 16
 _MOSTLY_DARK = 0.8  # share of walls from which a floor plan is light on dark; mazes of corridors have up to 0.6
 
 
@@ -115,10 +118,30 @@ def read_floor_plan(path: pathlib.Path, pixel_size: float) -> OccupancyGrid:
         )
 
     # The part of the picture that the walls span, with the lower left corner of the picture as origin.
-    states = _without_surroundings(states)
+    # Soft edges are floor inside; outside, walls reach to the middle of them.
+    edges = _soft_edges(states, gray)
+    states = _without_surroundings(np.where(edges, FREE, states))
+    states[edges & (states == UNKNOWN) & (gray < 128) & _near(states == OCCUPIED)] = OCCUPIED
     rows, columns = _box_of_walls(states)
     x, y = columns.start * pixel_size, (len(states) - rows.stop) * pixel_size
     return OccupancyGrid(states[rows, columns], pixel_size, (x, y, 0.0), shades=shades, frame=states.shape)
+
+
+def _soft_edges(states: np.ndarray, gray: np.ndarray) -> np.ndarray:
+    """Returns which pixels are shades between a dark wall and the floor beside it: `[H, W]` bool.
+
+    They come of blur, scanning or enlarging. In a free corner of a maze they are up to three quarters dark. Areas of
+    one shade are no edges, nor are thin lines, which are darker than what is around them.
+    """
+    is_dark, is_free, around = gray < _DARK, states == FREE, np.ones((3, 3))
+    is_slope = cv2.morphologyEx(gray, cv2.MORPH_GRADIENT, around) >= _CONTRAST
+    is_line = cv2.morphologyEx(gray, cv2.MORPH_BLACKHAT, around) >= _CONTRAST
+    return ~is_dark & ~is_free & is_slope & ~is_line & _near(is_dark) & _near(is_free)
+
+
+def _near(pixels: np.ndarray) -> np.ndarray:
+    """Returns which pixels are as near to some of `pixels` as a soft edge is wide."""
+    return cv2.dilate(pixels.astype(np.uint8), np.ones((2 * _SOFT + 1,) * 2)) > 0
 
 
 def _box_of_walls(states: np.ndarray) -> tuple[slice, slice]:
@@ -134,9 +157,10 @@ def _without_surroundings(states: np.ndarray) -> np.ndarray:
     free = inside == FREE
     if free.sum() < _LEAST_INSIDE * states[_box_of_walls(states)].size:
         return states
-    # Specks and frames on the paper are dark, too; the walls are what touches free pixels.
+    # Specks and frames on the paper are dark, too; the walls are what touches an area with free pixels.
     dark, _ = scipy.ndimage.label(states == OCCUPIED, structure=np.ones((3, 3)))
-    walls = np.isin(dark, dark[scipy.ndimage.binary_dilation(free, np.ones((3, 3))) & (dark > 0)])
+    floor = np.isin(light[1:-1, 1:-1], np.unique(light[1:-1, 1:-1][free]))
+    walls = np.isin(dark, dark[scipy.ndimage.binary_dilation(floor, np.ones((3, 3))) & (dark > 0)])
     return np.where((dark > 0) & ~walls, UNKNOWN, inside)
 
 
