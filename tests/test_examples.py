@@ -157,7 +157,7 @@ class TestScripts:
     def test_dagger(self, script):
         needs("torch")
         output = script("dagger.py", "--steps", "1280", "--distances", "15")
-        assert re.fullmatch(r"saved student\.pt; success rate on dev (.*), 9 episodes\n", output)
+        assert re.fullmatch(r"saved student; success rate on dev (.*), 9 episodes\n", output)
 
 
 class TestPackage:

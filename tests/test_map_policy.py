@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 import torch
 from mazebench_agents.common.symmetry import NUM_SYMMETRIES
-from mazebench_agents.map_policy import MapPolicy, cloning
+from mazebench_agents.expert import Expert
+from mazebench_agents.map_policy import MapPolicy
+from mazebench_agents.map_policy.cloning import turned
 from mazebench_agents.map_policy.network import MapNetwork
-from mazebench_agents.robot.quickest import costs_of_actions, make_course
 
 from mazebench.errors import UnplayableError
+from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.testing import check_agent
+from mazebench.training.collector import Collector
+from mazebench.training.loop import train
 from mazebench.world.bodies import SLIDER
 
 
@@ -27,43 +31,52 @@ def test_a_cell_knows_the_goal_that_is_up_to_41_cells_away():
 
 
 @pytest.mark.parametrize("symmetry", range(NUM_SYMMETRIES))
-def test_a_turned_example_is_one_of_the_turned_maze(symmetry):
-    examples = cloning.Examples(0, pool=3)
-    example = examples._pool[0]
-    pictures = np.zeros((len(example.pose), 1, 1, 3), np.uint8)
-    maps, pose, velocity, _, labels = cloning._turned(example, pictures, symmetry)
+def test_a_turned_minibatch_is_one_of_the_turned_maze(symmetry):
+    """The oracle labels its states so, but where ties of the search fall otherwise."""
+    task = Task.of("building", split="train", sensors="egocentric", distances=(5,))
+    learner = MapPolicy.build_learner(task, overrides={"num_envs": "8"})
+    steps = Collector(task, 8).collect(learner.actor, seed=0)
+    for _ in range(4):
+        step = next(steps)
+    maps, pose, velocity = (torch.from_numpy(part) for part in (np.stack(step.notes.shared), *step.notes.parts))
+    label, pictures = torch.from_numpy(learner.seen(step).parts[-1]), torch.zeros(8, 1, 1, 3, dtype=torch.uint8)
+    maps, pose, velocity, _, label = turned(symmetry, maps, pose, velocity, pictures, label)
 
-    walls, goal = maps[0].numpy() > 0, tuple(np.argwhere(maps[1].numpy())[0].tolist())
-    course = make_course(SLIDER, walls, 1.0, goal)
+    mazes = [Maze(each[0].numpy() > 0, "turned") for each in maps]
+    goal = maps[:, 1].flatten(1).argmax(1).numpy()
     yaw, (forward, left) = pose[:, 2].numpy(), velocity.numpy().T
     on_map = np.stack([np.cos(yaw) * forward - np.sin(yaw) * left, np.sin(yaw) * forward + np.cos(yaw) * left], 1)
-    costs = costs_of_actions(
-        course.motion,
-        *(np.repeat(values[None], len(yaw), axis=0) for values in (course.walls, course.way_left)),
-        np.full((len(yaw), 2), (course.goal_x, course.goal_y)),
-        1.0, pose.numpy().astype(np.float64), on_map.astype(np.float64),
-    )  # fmt: skip
-    found = torch.softmax(torch.from_numpy(-costs / 0.08).float(), dim=1)
-    assert (found - labels).abs().mean() < 0.02  # ties of the search may fall otherwise
-
-
-def test_a_batch_is_of_new_mazes_too():
-    examples = cloning.Examples(0, pool=3)
-    first = {example.maze for example in examples._pool}
-    maps, pose, velocity, pictures, labels = examples.batch()
-    assert maps.shape == (16, 2, 31, 31)
-    assert [tuple(each.shape[:2]) for each in (pose, velocity, pictures, labels)] == [(16, 24)] * 4
-    assert first.isdisjoint(example.maze for example in examples._pool)
+    costs = Expert(mazes, 8, SLIDER).costs(
+        np.arange(8), goal, pose.numpy().astype(np.float64), on_map.astype(np.float64)
+    )
+    assert (torch.softmax(torch.from_numpy(-costs / 0.08).float(), dim=1) - label).abs().mean() < 0.02
 
 
 def test_the_checkpoint_that_ships_does_what_the_oracle_does():
-    """In two of three states of other drives than it learned from."""
-    interface = Task.of("building", sensors="egocentric").interface
-    network = MapPolicy.build(interface)._network
-    maps, pose, velocity, pictures, labels = cloning.Examples(1, pool=12).batch()
-    with torch.no_grad():
-        logits = network(network.read(maps), pose, velocity, pictures)
-    assert (logits.argmax(-1) == labels.argmax(-1)).float().mean() > 0.6
+    """In more than half of the states of its own drives."""
+    task = Task.of("building", split="train", sensors="egocentric", distances=(5, 15))
+    learner = MapPolicy.build_learner(task, overrides={"num_envs": "32", "rollout_steps": "20", "learning_rate": "0"})
+    learner.actor.load(MapPolicy.default_checkpoint())
+    steps = Collector(task, 32).collect(learner.actor, seed=0)
+    for _ in range(20):
+        learner.observe(next(steps))
+    assert learner.update()["agreement"] > 0.55
+
+
+def run(out, env_steps, resume=False):
+    """A training with a milestone every 80 steps, which are two rollouts; returns its last checkpoint."""
+    values = {"num_envs": 8, "rollout_steps": 5, "epochs": 1, "minibatches": 2, "kept_rollouts": 3}
+    options = {"overrides": values, "checkpoint_steps": 80, "eval_mazes": 1, "distances": 15}
+    train("map-policy", "building", out=out, env_steps=env_steps, resume=resume, **options)
+    return max((out / "checkpoints").iterdir())
+
+
+def test_resumed_run_is_the_unbroken_one(tmp_path):
+    whole = run(tmp_path / "whole", 160)
+    run(tmp_path / "broken", 80)
+    resumed = run(tmp_path / "broken", 160, resume=True)
+    for path in whole.iterdir():
+        assert path.read_bytes() == (resumed / path.name).read_bytes(), path.name
 
 
 def test_agent_keeps_its_contract():

@@ -8,7 +8,7 @@ import torch
 from mazebench_agents.common.path_layer import FAR, CheapestWays
 from mazebench_agents.neural_planner import NeuralPlanner
 from mazebench_agents.neural_planner.network import PlannerNetwork, Situation, grid_bytes, motion_features
-from mazebench_agents.neural_planner.planner_learner import advantages, clipped_loss
+from mazebench_agents.neural_planner.reward_learner import advantages, clipped_loss
 from simple_mazes import field
 
 from mazebench.errors import InputError

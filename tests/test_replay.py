@@ -13,7 +13,7 @@ from mazebench_agents.common.replay import Hindsight, Replay
 from mazebench.training.experience import Experience
 
 # What the replay doesn't read: it makes rewards and ends for the goals that it relabels.
-UNREAD = dict.fromkeys(("pose", "velocity", "reward", "terminated", "notes"))
+UNREAD = dict.fromkeys(("pose", "velocity", "reward", "terminated", "stream", "notes"))
 NO_HINDSIGHT = Hindsight(ratio=0.0)
 ALWAYS = Hindsight(ratio=1.0, mean_offset=2.0, window=10)
 WINDOW = 5

@@ -4,8 +4,10 @@ import itertools
 import json
 import logging
 import math
+import pathlib
 import shutil
 import signal
+import subprocess
 import time
 
 import hypothesis
@@ -14,6 +16,7 @@ import pytest
 from acting import RandomActor
 from faults import TINY
 from hypothesis import strategies
+from processes import run_python
 from simple_mazes import field
 
 from mazebench import stopping
@@ -25,6 +28,7 @@ from mazebench.training.collector import Collector
 from mazebench.training.loop import TrainingError, train
 from mazebench.training.run_folder import RunFolder, read_metrics
 
+ROOT = pathlib.Path(__file__).parents[1]
 JSON = strategies.recursive(
     strategies.none() | strategies.integers() | strategies.text(),
     lambda inner: (
@@ -275,3 +279,22 @@ def test_collector_gives_every_episode_a_seed_of_its_own_that_is_not_the_episode
     assert not set(seeds) & {episode.seed for episode in env.episodes}
     for before, after in itertools.pairwise(steps):
         np.testing.assert_array_equal(before.notes != after.notes, after.new_episode)
+
+
+def test_the_learned_agent_of_the_page_on_extending_learns(tmp_path):
+    """docs/examples/extend/learned_agent.diff, applied to a tree of links to the code."""
+    (tmp_path / "agents").mkdir()
+    for child in (ROOT / "agents").iterdir():
+        (tmp_path / "agents" / child.name).symlink_to(child)
+    (tmp_path / "mazebench_agents").symlink_to(tmp_path / "agents")
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    diff = ROOT / "docs" / "examples" / "extend" / "learned_agent.diff"
+    subprocess.run(["git", "apply", diff], cwd=tmp_path, check=True)
+    options = "--kinds dfs --num-mazes 8 --sensors lidar --env-steps 8000 --checkpoint-steps 8000 --eval-mazes 4"
+    values = "total_steps=8000", "num_envs=40", "rollout_steps=25", "epochs=8", "learning_rate=0.003"
+    arguments = [*options.split(), *(each for value in values for each in ("--set", value)), "--out", tmp_path / "run"]
+    agent = ("--agent", "mazebench_agents.homing:Homing")
+    run_python("-m", "mazebench", "train", *agent, *arguments, variables={"PYTHONPATH": str(tmp_path)}, cwd=tmp_path)
+    learned = metrics(tmp_path / "run")[-1]
+    assert learned["agreement"] > 0.4
+    assert learned["success_rate_2"] > 0.6

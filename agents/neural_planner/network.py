@@ -47,16 +47,6 @@ class Situation(NamedTuple):
     motion: torch.Tensor  # [K, 15] float32, see `motion_features`
 
 
-class Choice(NamedTuple):
-    """Actions chosen in B environments, with what a learner needs of the choice."""
-
-    stream: int  # the seed of the exploration, another one for other trajectories
-    grids: list[np.ndarray]  # B of [4, L, L] uint8; the same object while a plan is kept
-    situation: Situation  # of B states
-    log_probability: np.ndarray  # [B] float32, of the action, at temperature 1
-    value: np.ndarray  # [B] float32
-
-
 def grid_bytes(prior: np.ndarray, walls: np.ndarray, evidence: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """Returns the network's input for a grid, `[4, L, L]` uint8: bytes, because learners keep many.
 

@@ -7,23 +7,27 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, Self
+from collections.abc import Iterable
+from typing import ClassVar, Self
 
 import numpy as np
 import torch
+from torch.nn import functional
 
 from mazebench.agent import Inputs, Interface, Report
 from mazebench.constants import NUM_ACTIONS, YAW_RATE
+from mazebench.tasks.task import Task
 
-from ..common.actor import NetworkAgent, acting
+from ..common.actor import acting
 from ..common.layers import in_batches
+from ..common.rollouts import RolloutLearner, Rows
+from ..imitation import ImitatingAgent, ImitationLearner
 from ..robot.motion import Motion, moved_in_the_open
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses, report
-from .network import NUM_RANGES, REACH, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
+from .network import NUM_RANGES, REACH, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
-from .planner_learner import PlannerLearner
+from .reward_learner import Choice, RewardLearner
 
 # Grids and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 _GRIDS_AT_ONCE = 8
@@ -51,13 +55,12 @@ class ActorState:
     choice: Choice | None = None  # of the last step, while exploring
 
 
-class NeuralPlanner(NetworkAgent):
+class NeuralPlanner(ImitatingAgent):
     """Plans on what its senses tell, every few steps, and acts by a policy that reads the plan."""
 
     name: ClassVar[str] = "neural-planner"
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
-    learner_class: ClassVar[type[PlannerLearner]] = PlannerLearner
     learns_several_tasks = True
     config: NeuralPlannerConfig
     network: PlannerNetwork
@@ -69,10 +72,10 @@ class NeuralPlanner(NetworkAgent):
         """Returns a new network, which plans on grids of any size."""
         return PlannerNetwork(config.channels, config.hidden, config.ways)
 
-    @classmethod
-    def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
-        """Returns one goal an episode."""
-        return {"num_goals": 1}
+    @staticmethod
+    def learner_class(agent: NeuralPlanner, task: Task, seed: int) -> RolloutLearner:
+        """Returns the learner that the config's teacher teaches."""
+        return ImitationLearner(agent, task, seed) if agent.config.teacher == "oracle" else RewardLearner(agent, seed)
 
     def for_interface(self, interface: Interface) -> Self:
         """Returns an agent with the same network, whose senses are those in the environments of an interface."""
@@ -82,7 +85,7 @@ class NeuralPlanner(NetworkAgent):
 
     def explore_from(self, seed: int) -> None:
         """Begins a new stream of exploration."""
-        self._rng, self._stream = np.random.default_rng([seed, 0]), seed
+        self._rng = np.random.default_rng([seed, 0])
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns no robots yet: one is made where an episode begins."""
@@ -126,16 +129,30 @@ class NeuralPlanner(NetworkAgent):
             log_probability = logits - np.log(np.exp(logits - logits.max(1, keepdims=True)).sum(1, keepdims=True))
             log_probability -= logits.max(1, keepdims=True)
             taken = np.take_along_axis(log_probability, chosen[:, None], axis=1)[:, 0]
-            state.choice = Choice(self._stream, [robot.grid for robot in robots], situation, taken, value)
+            state.choice = Choice([robot.grid for robot in robots], situation, taken, value)
         return actions, state
 
     def report(self, state: ActorState) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
         return report(robot.memory if robot else None for robot in state.robots)
 
-    def notes(self, state: ActorState) -> Choice | None:
+    def notes(self, state: ActorState) -> Choice | None:  # type: ignore[override]
         """Returns the last choice."""
         return state.choice
+
+    def read(self, rows: Rows) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """Returns log probabilities `[R, 6]` of actions in rows, and scalars to log by name."""
+        log_probabilities, _, scalars = self.evaluated(rows)
+        return log_probabilities, scalars
+
+    def evaluated(self, rows: Rows) -> tuple[torch.Tensor, torch.Tensor, dict[str, torch.Tensor]]:
+        """Returns log probabilities `[R, 6]` and values `[R]` of rows, and scalars to log by name."""
+        plan = self.network.plan(rows.shared)
+        logits, value = self.network(plan, rows.index, Situation(*rows.parts))
+        log_probabilities, wall = functional.log_softmax(logits, dim=1), plan.wall > 0.5
+        entropy = -(log_probabilities.exp() * log_probabilities).sum(dim=1).mean()
+        costs = {"wall_cost": plan.cost[wall].mean(), "free_cost": plan.cost[~wall].mean()}
+        return log_probabilities, value, {"entropy": entropy, **costs}
 
     def _plan(self, robots: list[Robot]) -> None:
         """Plans for robots, those whose grids have one size at once."""

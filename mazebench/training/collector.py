@@ -61,6 +61,7 @@ class Collector:
                 final_cell=final_cell,
                 context=observation["context"],
                 sensors={name: observation[name] for name in self._task.options.sensors},
+                stream=seed,
                 notes=actor.notes(step.state),
             )
 

@@ -35,4 +35,5 @@ class Experience(NamedTuple):
     final_cell: np.ndarray  # [B] int, likewise
     context: np.ndarray  # [B, 4, M, M] float32, observed before the step
     sensors: Observation  # [B, ...] by the sensor's name, observed before the step
+    stream: int  # the seed of the trajectories, which begin anew at a milestone
     notes: Any  # what the agent's `notes` returned
