@@ -56,9 +56,11 @@ class OpenSensors:
             for sensor in self._sensors
         )
 
-    def read(self, worlds: Worlds, noise: Sequence[Noise]) -> dict[str, np.ndarray]:
-        """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds; `noise` (`[K]`) is that of their episodes."""
+    def read(
+        self, maze: np.ndarray, pose: np.ndarray, marker: np.ndarray, noise: Sequence[Noise], num_threads: int
+    ) -> dict[str, np.ndarray]:
+        """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds as in `Worlds`; `noise` is of their episodes."""
         observed: dict[str, np.ndarray] = {}
         for sensor, rngs in zip(self._sensors, zip(*noise, strict=True), strict=True):
-            observed |= sensor.read(worlds._replace(rngs=rngs))
+            observed |= sensor.read(Worlds(maze, pose, marker, rngs, num_threads))
         return observed

@@ -13,7 +13,6 @@ from mazebench.tasks.episode import Episode, episode_level
 from mazebench.tasks.observation import Noise, OpenSensors, state_errors
 from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
-from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import PROGRESS
@@ -240,8 +239,8 @@ class Rules:
         observed = {"state": states.astype(np.float32)}
         if self.task.options.sensors:
             noise = [self._noise[i] for i in indices.tolist()]
-            worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], self._num_threads)
-            observed |= self._sensors.read(worlds, noise)
+            worlds = self.maze[indices], self.pose[indices], self.marker[indices]
+            observed |= self._sensors.read(*worlds, noise, self._num_threads)
         return observed
 
     def infos(self) -> dict[str, np.ndarray]:

@@ -39,8 +39,8 @@ class Worlds(NamedTuple):
     maze: np.ndarray  # [K] int, index among the task's mazes
     pose: np.ndarray  # [K, 3] float64, of the body: x, y (m), yaw (rad, not wrapped)
     marker: np.ndarray  # [K, 3] float64, m: where the goal marker stands
+    rngs: Sequence[np.random.Generator | None]  # [K], of the sensor's noise in the episodes; None where none is drawn
     num_threads: int = 1  # in which they may be read; 0 for all cores
-    rngs: Sequence[np.random.Generator | None] = ()  # [K], of the sensor's noise in the episodes; None where none is
 
 
 class Sensor(abc.ABC, Generic[OwnOptions]):
