@@ -61,7 +61,7 @@ def layouts() -> str:
     )
 
 
-def doors(count: int = 500) -> str:
+def doors(count: int = 100) -> str:
     """Returns shares of blocked and late episodes in `count` mazes of each kind, by the share that is aimed at.
 
     The robot follows a shortest path on the grid, sees 3.5 m and plans again. It is late beyond 1.25 shortest paths.
