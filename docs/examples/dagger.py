@@ -51,7 +51,13 @@ class Student(ImitatingAgent):
 
     @classmethod
     def default_checkpoint(cls):
-        raise mazebench.InputError("expected --checkpoint, a folder that dagger.py wrote, found none")
+        return None
+
+    @classmethod
+    def build(cls, interface, *, seed=0, checkpoint=None):
+        if checkpoint is None:
+            raise mazebench.InputError("expected --checkpoint, a folder that dagger.py wrote, found none")
+        return super().build(interface, seed=seed, checkpoint=checkpoint)
 
     def for_interface(self, interface):
         student = copy.copy(self)
