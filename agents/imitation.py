@@ -41,6 +41,7 @@ class ImitationLearner(RolloutLearner):
     """Learns to choose what the oracle would choose in the states that its actor drives into."""
 
     teacher = "the oracle"
+    actor: ImitatingAgent
 
     def __init__(self, actor: ImitatingAgent, task: Task, seed: int):
         """The oracle knows the true mazes of `task`."""
@@ -70,7 +71,7 @@ class ImitationLearner(RolloutLearner):
             f"{number}-{size}-{part}": array.numpy()
             for number, rollout in enumerate(self._kept)
             for size, rows in rollout.items()
-            for part, array in enumerate((rows.shared, rows.index, *rows.parts))
+            for part, array in enumerate((rows.shared, rows.group, *rows.parts))
         }
         with (folder / REPLAY_FILE).open("wb") as file:
             np.savez_compressed(file, **arrays)
@@ -128,7 +129,7 @@ class ImitatingAgent(NetworkAgent):
 
     def read(self, rows: Rows) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Returns log probabilities `[R, 6]` of actions in rows, and scalars to log by name; called with gradients."""
-        return functional.log_softmax(self.network(rows.shared[rows.index], *rows.parts), dim=1), {}
+        return functional.log_softmax(self.network(rows.shared[rows.group], *rows.parts), dim=1), {}
 
 
 def _last_parts(arrays: Mapping[str, Any]) -> list[tuple[int, int, int]]:

@@ -53,15 +53,15 @@ class Rows(NamedTuple):
     """Steps on grids or maps of one size."""
 
     shared: torch.Tensor  # [G, ...], what steps share
-    index: torch.Tensor  # [R] int, the one of each step
+    group: torch.Tensor  # [R] int, the one of each step
     parts: tuple[torch.Tensor, ...]  # [R, ...] each: the other parts of `Seen`, then what the learner adds
 
     def on(self, chosen: np.ndarray) -> Rows:
         """Returns the steps on the grids or maps `chosen`, in whose order these then are."""
         number = torch.full((len(self.shared),), -1)
         number[torch.from_numpy(chosen)] = torch.arange(len(chosen))
-        taken = number[self.index] >= 0
-        return Rows(self.shared[chosen], number[self.index[taken]], tuple(part[taken] for part in self.parts))
+        taken = number[self.group] >= 0
+        return Rows(self.shared[chosen], number[self.group[taken]], tuple(part[taken] for part in self.parts))
 
 
 class _Step(NamedTuple):
@@ -145,11 +145,11 @@ class RolloutLearner(NetworkLearner):
         num_minibatches = config.epochs * config.minibatches if batches else 0
         for _ in range(num_minibatches):
             minibatch = [next(each) for each in batches]
-            total = sum(len(rows.index) for rows in minibatch)
+            total = sum(len(rows.group) for rows in minibatch)
             losses: dict[str, torch.Tensor] = {}
             for rows in minibatch:
                 for name, value in self.losses(rows).items():
-                    losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.index) / total)
+                    losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.group) / total)
             losses["gradient_norm"] = self.descent.step(losses["loss"])
             for name, number in in_numbers(losses).items():
                 sums[name] = sums.get(name, 0.0) + number / num_minibatches
@@ -187,6 +187,6 @@ class RolloutLearner(NetworkLearner):
 def _joined(rollouts: list[Rows]) -> Rows:
     """Returns the rows of several rollouts."""
     offsets = np.cumsum([0, *(len(rows.shared) for rows in rollouts)]).tolist()
-    index = torch.cat([rows.index + offset for rows, offset in zip(rollouts, offsets, strict=False)])
+    index = torch.cat([rows.group + offset for rows, offset in zip(rollouts, offsets, strict=False)])
     parts = tuple(map(torch.cat, zip(*(rows.parts for rows in rollouts), strict=True)))
     return Rows(torch.cat([rows.shared for rows in rollouts]), index, parts)

@@ -12,17 +12,16 @@ from mazebench.training.experience import Experience
 from mazebench.world.looks import LOOKS, PLAIN, VARIED, Camera, exposures_of
 from mazebench.world.ray_camera import RayCamera
 
-from ..common.actor import NetworkAgent
 from ..common.rollouts import Rows, Seen
 from ..common.symmetry import NUM_SYMMETRIES, turn_actions, turn_planes
-from ..imitation import ImitationLearner
+from ..imitation import ImitatingAgent, ImitationLearner
 from ..robot.cells import marked_cell
 
 
 class CloningLearner(ImitationLearner):
     """Keeps where the bodies were, not what they saw: pictures are drawn for each minibatch, in either look."""
 
-    def __init__(self, actor: NetworkAgent, task: Task, seed: int):
+    def __init__(self, actor: ImitatingAgent, task: Task, seed: int):
         """The pictures are of the mazes of `task`."""
         super().__init__(actor, task, seed)
         self._cameras = {look: RayCamera(task.mazes, Camera(), look) for look in LOOKS}
@@ -37,7 +36,7 @@ class CloningLearner(ImitationLearner):
         maze, true_pose, pose, velocity, label = rows.parts
         pictures = self._pictures(rows, maze.numpy(), true_pose.numpy())
         parts = turned(int(self.rng.integers(NUM_SYMMETRIES)), rows.shared, pose, velocity, pictures, label)
-        return super().losses(Rows(parts[0], rows.index, parts[1:]))
+        return super().losses(Rows(parts[0], rows.group, parts[1:]))
 
     def _pictures(self, rows: Rows, maze: np.ndarray, pose: np.ndarray) -> torch.Tensor:
         """Returns pictures `[R, 64, 64, 3]` uint8 in one of the two looks."""
@@ -47,7 +46,7 @@ class CloningLearner(ImitationLearner):
         gain, noise_at = np.ones(count, np.float32), np.full(count, -1)
         if look == VARIED:
             gain, noise_at = exposures_of(self.rng, count)
-        on_floor = marker[rows.index.numpy()]
+        on_floor = marker[rows.group.numpy()]
         return torch.from_numpy(
             self._cameras[look].take(("egocentric",), maze, pose, on_floor, gain, noise_at)["egocentric"]
         )

@@ -141,6 +141,6 @@ class MapPolicy(ImitatingAgent):
 
     def read(self, rows: Rows) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Returns log probabilities `[R, 6]` of actions in rows, whose parts are poses, velocities and pictures."""
-        features = self.network.read(rows.shared)[rows.index]
+        features = self.network.read(rows.shared)[rows.group]
         logits = self.network(features, *(part[:, None] for part in rows.parts))[:, 0]
         return functional.log_softmax(logits, dim=1), {}

@@ -148,7 +148,7 @@ class NeuralPlanner(ImitatingAgent):
     def evaluated(self, rows: Rows) -> tuple[torch.Tensor, torch.Tensor, dict[str, torch.Tensor]]:
         """Returns log probabilities `[R, 6]` and values `[R]` of rows, and scalars to log by name."""
         plan = self.network.plan(rows.shared)
-        logits, value = self.network(plan, rows.index, Situation(*rows.parts))
+        logits, value = self.network(plan, rows.group, Situation(*rows.parts))
         log_probabilities, wall = functional.log_softmax(logits, dim=1), plan.wall > 0.5
         entropy = -(log_probabilities.exp() * log_probabilities).sum(dim=1).mean()
         costs = {"wall_cost": plan.cost[wall].mean(), "free_cost": plan.cost[~wall].mean()}

@@ -28,6 +28,8 @@ class Choice(NamedTuple):
 class RewardLearner(RolloutLearner):
     """Updates policy and values of its actor from the rewards of the last rollout."""
 
+    actor: Any  # a `NeuralPlanner`, which imports this module
+
     def seen(self, experience: Experience) -> Seen:
         """Adds the action, its probability and value when it was chosen, and what followed."""
         choice = experience.notes
