@@ -105,7 +105,7 @@ def test_the_last_command_is_read(answer, route):
         ("GO (2, 2)", r"\(2, 2\) is not in the row or column of \(1, 1\)"),
         ("GO north 3", r"\(-2, 1\) is outside of the map"),
         ("GO (1, 9999)", r"\(1, 9999\) is outside of the map"),
-        ("GO (1, 99999999999999)", "it names no other cell"),
+        ("GO (1, 99999999999999)", r"\(1, 99999999999999\) is outside of the map"),
     ],
 )
 def test_what_is_wrong_with_a_command_is_said(answer, fault):
