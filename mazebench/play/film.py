@@ -96,11 +96,14 @@ def film_result(
     played_task(summary)  # refuses mazes that were changed
 
     # The evaluation's plan.
+    identity = read_json(folder / CONFIG)
+    if not isinstance(identity, dict):
+        raise InputError(f"{folder / CONFIG}: expected the identity of a run, found {type(identity).__name__}")
     options = EvalOptions(
         agent=summary.agent,
         task=summary.task,
         episodes_per_distance=origin.episodes_per_distance,
-        episodes_per_maze=read_json(folder / CONFIG).get("episodes_per_maze", FROZEN_PER_MAZE),
+        episodes_per_maze=identity.get("episodes_per_maze", FROZEN_PER_MAZE),
         seed=origin.seed,
         **chosen,
     )
