@@ -415,10 +415,10 @@ class TestService:
 
     def test_a_run_ends_at_its_limit_of_tokens_and_goes_on_with_a_higher_one(self, unbroken, tmp_path, serve):
         config = serve().config
-        said = r"spent [1-9],?\d+ tokens of token_limit 9,000, and the next answer may take [45],\d+ "
+        said = r"spent [1-9],?\d+ tokens of token_limit 7,000, and the next answer may take [45],\d+ "
         with pytest.raises(RunError, match=said):
-            evaluate("llm", out=tmp_path, overrides=config | {"token_limit": 9000}, **FLIPPED)
-        assert 9000 - 6000 < 110 * len(answers_of(tmp_path)) <= 9000
+            evaluate("llm", out=tmp_path, overrides=config | {"token_limit": 7000}, **FLIPPED)
+        assert 7000 - 6000 < 110 * len(answers_of(tmp_path)) <= 7000
         evaluate("llm", out=tmp_path, overrides=config, resume=True, **FLIPPED)
         assert driven(tmp_path) == driven(unbroken)
 

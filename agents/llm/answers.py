@@ -48,13 +48,14 @@ class Answers:
         """Returns the answers in situations, which are asked for at once. If one can't be had, the others are kept."""
         asked = [[messages(each), self._config.sampling, each.seed] for each in situations]
         keys = [hashlib.sha256(json.dumps(each, sort_keys=True).encode()).hexdigest() for each in asked]
-        with concurrent.futures.ThreadPoolExecutor(self._config.concurrency) as threads:
-            found = threads.map(self._find, keys, situations)
-        if self._lacks_usage and not self._has_said:
-            self._has_said = True
-            counts = "is not counted" if self._config.token_limit is None else "counts as the most that it may take"
-            remark(f"agent 'llm': the service tells no usage of an answer, which {counts}")
-        list(found)  # raises what one of them raised
+        try:
+            with concurrent.futures.ThreadPoolExecutor(self._config.concurrency) as threads:
+                list(threads.map(self._find, keys, situations))
+        finally:
+            if self._lacks_usage and not self._has_said:
+                self._has_said = True
+                counts = "is not counted" if self._config.token_limit is None else "counts as the most that it may take"
+                remark(f"agent 'llm': the service tells no usage of an answer, which {counts}")
         return [self._kept[key] for key in keys]
 
     def _find(self, key: str, situation: Situation) -> None:
