@@ -111,10 +111,10 @@ class Answers:
 
     @property
     def _longest_answer(self) -> int:
-        """The most tokens of an answer, as it is asked for."""
+        """The most tokens of an answer, as it is asked for; all that are left to spend if the request has no bound."""
         fields = self._config.sampling
-        most = fields.get("max_completion_tokens", fields.get("max_tokens"))
-        return most if isinstance(most, int) else self._config.max_tokens
+        most, count = fields.get("max_completion_tokens", fields.get("max_tokens")), fields.get("n", 1)
+        return most * count if isinstance(most, int) and isinstance(count, int) else self._config.token_limit or 0
 
     def _cost(self, answer: Answer, most: int) -> int:
         """Returns the tokens of an answer; where the service does not tell them, the most that it may have taken."""
