@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import io
 import pathlib
+import re
+import shutil
+import subprocess
 import tempfile
 from typing import Any, NamedTuple
 
@@ -25,20 +28,26 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.film import run_episode
 from mazebench.maps import colors
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
+from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
-from mazebench.maps.maze import Cell, Maze, path_through_walls
-from mazebench.maps.pictures import draw_grid, draw_rays
+from mazebench.maps.maze import Cell, Maze, corner_cells, path_through_walls
+from mazebench.maps.pictures import draw_grid, draw_rays, write_image
 from mazebench.report.page import lay_on_first_pose
+from mazebench.report.write_report import write_report
 from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.arena import arena_of
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.sensors.cameras import as_colors
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import resolve
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.bodies import SLIDER
+from mazebench.world.looks import PLAIN, VARIED, Camera, exposures_of
+from mazebench.world.ray_camera import RayCamera
 from mazebench.world.ray_casting import ray_ends
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "images"
@@ -54,6 +63,9 @@ PLANNED = "#7b2cbf"  # of the shortest path on the map, and of the door that clo
 ODOMETRY = "#0b7a8a"
 
 OBSERVED = 6  # seed of the episode
+SEEN = 4  # likewise of the places in all looks
+STRIDE = 0.15  # m, of a drawn shortest path
+EXPLORED = 10  # the episode in the explorer
 FILMED = 94  # the episode: the navigator finds a door closed and drives around
 VIEWS = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
 SIDE, GAP, TITLE, LEGEND = 256, 12, 32, 70  # pixels; three views and four gaps are 816 wide
@@ -262,6 +274,82 @@ def draw_changes() -> None:
     figure.savefig(FOLDER / "your-map.png", dpi=110, metadata={"Software": None})
 
 
+def draw_looks() -> None:
+    """Draws six places in mazes of no split by the agent's camera, a look in each row."""
+    envs = mazebench.make_vec("local", 6, kinds=("house", "rooms"), size=31, distances=(2, 3, 4))
+    envs.reset(seed=SEEN)
+    rules, (gain, noise_at) = envs.rules, exposures_of(np.random.default_rng(SEEN), 6)
+    as_it_is = np.ones(6, dtype=np.float32), np.full(6, -1)
+    near, wide = Camera(size=96), Camera(size=96, fov=200)
+    rows = (
+        ("egocentric", near, PLAIN, False, as_it_is),
+        ("egocentric", near, VARIED, False, (gain, noise_at)),
+        ("egocentric", near, VARIED, True, (gain, noise_at)),
+        ("egocentric", wide, VARIED, True, as_it_is),
+        ("depth", near, PLAIN, False, as_it_is),
+        ("labels", near, PLAIN, False, as_it_is),
+    )
+    sheet = np.full((6 * 100 - 4, 6 * 100 - 4, 3), 255, dtype=np.uint8)
+    for row, (name, camera, look, is_unseen, light) in enumerate(rows):
+        eye = RayCamera(envs.task.mazes, camera, look, is_unseen)
+        pictures = eye.take((name,), rules.maze, rules.pose, rules.marker, *light)[name]
+        for column, picture in enumerate(pictures):
+            top, left = 100 * row, 100 * column
+            sheet[top : top + 96, left : left + 96] = as_colors(name, picture)
+    write_image(sheet, FOLDER / "looks.png")
+
+
+def draw_shortest_paths() -> None:
+    """Draws the shortest paths of the body as a disc between opposite corners of three mazes, with their lengths."""
+    figure = Figure(figsize=(9.6, 3.5), layout="constrained")
+    for axes, kind in zip(figure.subplots(1, 3), ("dfs", "obstacles", "house"), strict=True):
+        maze = mazebench.generate(kind, 13, np.random.default_rng(2))
+        start, goal = corner_cells(maze)
+        path, length = _path_of_disc(maze, SLIDER.radius, start, goal)
+        picture = draw_grid(maze.walls, NEAR_PIXELS, start, goal, path)
+        _show(axes, picture, f"{length:.1f} m; on the grid {maze.distance(start, goal)} m", 11)
+    figure.savefig(FOLDER / "shortest-paths.png", dpi=110, metadata={"Software": None})
+
+
+def _path_of_disc(maze: Maze, radius: float, start: Cell, goal: Cell) -> tuple[np.ndarray, float]:
+    """Returns points `[T, 2]` (m) down the slope of the length that is left to the goal, and the whole length (m)."""
+    walls = maze.point(np.argwhere(maze.walls))
+    angles = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    steps = STRIDE * np.column_stack([np.cos(angles), np.sin(angles)])
+    paths, path = DiscPaths(maze, radius), [np.array(maze.point(start))]
+    whole = left = paths.length(path[0], goal)
+    while left > 0:
+        near = path[-1] + steps
+        beyond = np.maximum(np.abs(near[:, None] - walls) - maze.cell_size / 2, 0)
+        near = near[np.hypot(*np.moveaxis(beyond, -1, 0)).min(axis=1) >= radius]
+        lengths = [paths.length(point, goal) for point in near]
+        path.append(near[np.argmin(lengths)])
+        left = min(lengths)
+    return np.array(path), whole
+
+
+def draw_explorer() -> None:
+    """Takes a picture of the report's explorer, at an episode in which a closed door is driven around."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        print("report-explorer.png: expected Chromium, found none; the picture stays as it is")
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        options = {"task": "rebuilt", "level": 2, "split": "dev", "episodes_per_maze": 1}
+        mazebench.evaluate("navigator", out=folder / "navigator", record=True, **options)
+        write_report([folder / "navigator"], folder / "report")
+        # The explorer alone: what is around it is hidden.
+        page = (folder / "report" / "report.html").read_text(encoding="utf-8")
+        hidden = "<style>header, .skip, .notice, #figures, #results {display: none}</style>"
+        page = re.sub("<meta http-equiv[^>]*>", hidden, page)
+        (folder / "page.html").write_text(page, encoding="utf-8")
+        look = ("--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=20000")
+        size, target = "--window-size=1100,720", f"--screenshot={FOLDER / 'report-explorer.png'}"
+        address = (folder / "page.html").as_uri() + f"#episode=0-{EXPLORED}"
+        subprocess.run([browser, *look, size, target, address], check=True, capture_output=True)
+
+
 def _shown_map(shown: Shown) -> np.ndarray:
     pixels = shown.walls if shown.are_cells else shown.walls / 255
     start, goal = (None if mark < 0 else divmod(mark, len(pixels)) for mark in (shown.start, shown.goal))
@@ -303,4 +391,6 @@ def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **lo
 
 if __name__ == "__main__":
     for draw in (film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes):
+        draw()
+    for draw in (draw_looks, draw_shortest_paths, draw_explorer):
         draw()

@@ -68,8 +68,16 @@ class AgentConfig(Options):
     """Base of an agent's config, a frozen dataclass whose values `mazebench eval --set KEY=VALUE` replaces."""
 
     def identity(self) -> dict[str, Any]:
-        """Returns what may change results, as values that JSON can hold: by default all fields."""
+        """Returns what may change results, as values that JSON can hold: by default all fields.
+
+        `mazebench render --results` takes these values from other people's files. Leave out addresses and secrets.
+        """
         return dataclasses.asdict(self)
+
+    @property
+    def needs_one_process(self) -> bool:
+        """True if an evaluation must not be spread over worker processes."""
+        return False
 
 
 class _Declarations:

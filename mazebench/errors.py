@@ -71,6 +71,8 @@ def remarks_to(show: Callable[[str], object]) -> Iterator[None]:
 
 def one_line(text: str) -> str:
     """Returns `text` with characters escaped that do not print, such as line ends and commands to a terminal."""
+    if text.isprintable():
+        return text
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mazebench.agent_loading import load_agent_class
 from mazebench.constants import STEP_TIME
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, remark, unknown
@@ -68,11 +69,15 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
     return _film(plan, options.seed % len(plan.trials), out, view, pixels).words
 
 
-def film_result(result: Result, number: int, out: pathlib.Path, view: str, pixels: int, **chosen: Any) -> str:
+def film_result(
+    result: Result, number: int, out: pathlib.Path, view: str, pixels: int, agent: str | None = None, **chosen: Any
+) -> str:
     """Runs the episode `number` of a finished evaluation again, and writes it as `film_episode` does.
 
-    A `mazebench.errors.Remark` warns if success or steps are not those of the record. `chosen` has `checkpoint`, that
-    of the evaluation unless it is the shipped one, and `overrides`, further values of the agent's config.
+    A `mazebench.errors.Remark` warns if success or steps are not those of the record. The result may be somebody
+    else's: of its config, only what may change results counts, and a `module:Class` is imported only if `agent` names
+    it. `chosen` has `checkpoint`, that of the evaluation unless it is the shipped one, and `overrides`, further values
+    of the agent's config.
 
     Raises:
       InputError: also if there is no such episode, or the mazes or the checkpoint are not those of the evaluation.
@@ -82,12 +87,21 @@ def film_result(result: Result, number: int, out: pathlib.Path, view: str, pixel
         raise InputError(f"{folder}: expected results with one goal per episode, found {summary.task.num_goals} goals")
     if not number < summary.episodes:
         raise InputError(f"{folder}: expected an episode from 0 to {summary.episodes - 1}, found {number}")
+    if agent != summary.agent and (agent is not None or ":" in summary.agent):
+        raise InputError(f"{folder}: its agent is {summary.agent!r}; name it by --agent, found {agent or 'none named'}")
+    config = load_agent_class(summary.agent).eval_config
+    known = config.identity() if config else {}
+    if other := summary.config.keys() - known.keys():
+        expected = ", ".join(known) or "none"
+        raise InputError(f"{folder}: expected in config what may change results: {expected}; found {min(other)!r}")
     played_task(summary)  # refuses mazes that were changed
 
     # The evaluation's plan.
-    counting, config = counting_option(summary.task), read_json(folder / CONFIG)
+    identity, counting = read_json(folder / CONFIG), counting_option(summary.task)
+    if not isinstance(identity, dict):
+        raise InputError(f"{folder / CONFIG}: expected the identity of a run, found {type(identity).__name__}")
     if counting is not None:
-        chosen[counting] = config.get(counting)
+        chosen[counting] = identity.get(counting)
     options = EvalOptions(agent=summary.agent, task=summary.task, seed=origin.seed, **chosen)
     plan = make_plan(options.replace(overrides={**summary.config, **options.overrides}))
     expected, found = (str(each.checkpoint_sha256)[:8] for each in (origin, plan.provenance))

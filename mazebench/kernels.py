@@ -77,8 +77,9 @@ def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
     It lies in NUMBA_CACHE_DIR, in `beside`, or in the user's cache.
     """
     users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    given = [pathlib.Path(_CONFIG.CACHE_DIR)] if _CONFIG.CACHE_DIR else []
-    for parent in (*given, beside, pathlib.Path(users) / "mazebench"):
+    # Not what numba read in the working folder's .numba_config.yaml: it unpickles what lies in the folder.
+    given = os.environ.get("NUMBA_CACHE_DIR", "")
+    for parent in (*([pathlib.Path(given)] if given else []), beside, pathlib.Path(users) / "mazebench"):
         folder = parent / f"kernels-{digest}"
         try:
             folder.mkdir(parents=True, exist_ok=True)

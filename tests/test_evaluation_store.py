@@ -24,6 +24,7 @@ from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.store import Store
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
+from mazebench.storage.files import locked
 
 NAMES = strategies.sampled_from(["result", "trajectory", "number", "success"]) | strategies.text(max_size=3)
 JSON = strategies.none() | strategies.booleans() | strategies.integers() | strategies.floats(-1, 1) | strategies.text()
@@ -187,3 +188,12 @@ def test_a_config_that_is_none_is_refused(plan, tmp_path):
     (tmp_path / "config.json").write_text("[]")
     with pytest.raises(InputError, match=r"config\.json: expected the identity of a run, found list$"):
         Store(tmp_path, plan, resume=True, record=False)
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_second_evaluation_in_the_folder_is_refused_while_the_first_writes(tmp_path, resume):
+    with locked(tmp_path, "evaluation"):
+        with pytest.raises(InputError, match="another evaluation writes there; end it, or name another folder"):
+            evaluate("random", out=tmp_path, resume=resume, **FEW)
+        assert not [*tmp_path.iterdir()]
+    evaluate("random", out=tmp_path, resume=resume, **FEW)

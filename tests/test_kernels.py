@@ -12,7 +12,7 @@ from mazebench import kernels
 @pytest.fixture
 def users_cache(tmp_path, monkeypatch):
     """The user's cache, where no other is chosen."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache" / "mazebench"
 
@@ -30,7 +30,9 @@ class TestCacheFolder:
     ):
         assert kernels.cache_folder(tmp_path, "12") == tmp_path / "kernels-12"
         assert kernels.cache_folder(file, "12") == users_cache / "kernels-12"
-        monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "numba"))
+        monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "from .numba_config.yaml"))
+        assert kernels.cache_folder.__wrapped__(tmp_path, "12") == tmp_path / "kernels-12"
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
         assert kernels.cache_folder(tmp_path, "34") == tmp_path / "numba" / "kernels-34"
 
     def test_a_line_says_that_each_start_compiles_if_none_can_be_written(self, users_cache, file, monkeypatch, remarks):

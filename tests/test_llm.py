@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import http.server
 import io
 import json
@@ -17,10 +18,15 @@ from collections.abc import Callable, Iterator
 import cv2
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from mazebench_agents.llm import scripted
-from mazebench_agents.llm.decision import read_decision
+from mazebench_agents.llm.answer import Answer
+from mazebench_agents.llm.config import LLMConfig
+from mazebench_agents.llm.decision import CUT, FILTERED, WITHOUT_TEXT, read_decision
+from mazebench_agents.llm.service import NoAnswerError, answer_of, ask_service
 from mazebench_agents.llm.situation import Situation, picture, prompt
-from run_folders import records_of, results_of, summary_of
+from run_folders import files_of, records_of, results_of, summary_of
 
 from mazebench.agent import Agent, AgentConfig
 from mazebench.errors import InputError, RunError, UnplayableError
@@ -28,6 +34,7 @@ from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
+from mazebench.storage.json_files import to_line
 
 GOLDEN = pathlib.Path(__file__).parent / "golden"
 FLIPPED = {"distances": (8,), "episodes_per_distance": 1, "map_flip": 0.1}  # 20 episodes on wrong maps, without a lidar
@@ -38,6 +45,10 @@ NEAR = {
     "distances": range(15, 19),
     "episodes_per_maze": 1,
 }  # 11 of a track
+ONE = {"task": "rebuilt", "level": 2, "kinds": ("dfs",), "num_mazes": 1, "size": 13, "distances": (15,)}
+ONE |= {"split": "dev", "episodes_per_distance": 1}  # one episode
+SECRET = "sk-SECRET-1234567890"
+QUICK = settings(max_examples=200, deadline=None, database=None)
 
 
 def situation(told: bool = True) -> Situation:
@@ -88,6 +99,11 @@ class TestPrompt:
         ("GO (1, 3)\nNo.\nMy answer: GO (2,1)\nI hope it will go well.", ((1, 1), (2, 1))),
         ("GO (1, 2) (1, 1)", ((1, 1), (1, 2), (1, 1))),
         ("wait", ()),
+        ("GO 2 south, 1 east", ((1, 1), (2, 1), (3, 1), (3, 2))),
+        ("GO South: 2 cells, then east=1", ((1, 1), (2, 1), (3, 1), (3, 2))),
+        ("<answer>GO south2 east +1</answer>", ((1, 1), (2, 1), (3, 1), (3, 2))),
+        ("<think>I GO (3, 1)</think>\nGO (1, 2)", ((1, 1), (1, 2))),
+        ("\n" * 200_000 + "#.#\n---\n" * 20_000 + "GO (1, 2)", ((1, 1), (1, 2))),  # in no time
     ],
 )
 def test_the_last_command_is_read(answer, route):
@@ -105,7 +121,14 @@ def test_the_last_command_is_read(answer, route):
         ("GO (2, 2)", r"\(2, 2\) is not in the row or column of \(1, 1\)"),
         ("GO north 3", r"\(-2, 1\) is outside of the map"),
         ("GO (1, 9999)", r"\(1, 9999\) is outside of the map"),
-        ("GO (1, 99999999999999)", "it names no other cell"),
+        ("GO north three", "'three' can't be read"),
+        ("GO south -2", "'-2' can't be read"),
+        ("GO south 1.5", "'.5' can't be read"),
+        ("GO southeast 2", "'southeast' can't be read"),
+        ("GO south 2 3", "'3' can't be read"),
+        ("WAIT 5", "it waits for one step, not 5"),
+        ("\n" * 200_000, "no line with GO or WAIT"),
+        ("GO (1, 99999999999999)", r"\(1, 99999999999999\) is outside of the map"),
     ],
 )
 def test_what_is_wrong_with_a_command_is_said(answer, fault):
@@ -114,12 +137,176 @@ def test_what_is_wrong_with_a_command_is_said(answer, fault):
     assert re.match(fault, decision.fault)
 
 
+@pytest.mark.parametrize(
+    ("answer", "reason", "flaw"),
+    [
+        ("", "stop", WITHOUT_TEXT),
+        ("<think>GO (1, 2)</think>", "stop", WITHOUT_TEXT),
+        ("", "length", CUT),
+        ("<think>One way is GO (1, 2) but that may be bl", "length", CUT),
+        ("<think>One way is\nGO (1, 2)\n", "", CUT),
+        ("I think of\nGO (1, 2)", "length", CUT),
+        ("GO (1, 2)\nor", "MAX_TOKENS", CUT),
+        ("GO (1", "content_filter", FILTERED),
+        ("GO (1, 2)", "stop", ""),
+        ("So:\nGO (1, 2)\n", "length", ""),  # a whole line
+    ],
+)
+def test_an_answer_that_ends_before_its_decision_is_none(answer, reason, flaw):
+    decision = read_decision(answer, (1, 1), 5, reason)
+    assert (decision.flaw, decision.route) == (flaw, () if flaw else ((1, 1), (1, 2)))
+
+
+def reply(content: object, reason: str = "stop", **others: object) -> bytes:
+    """What a service replies with an answer."""
+    return json.dumps({"choices": [{"message": {"content": content}, "finish_reason": reason}]} | others).encode()
+
+
+class TestReplies:
+    @pytest.mark.parametrize(
+        ("body", "text"),
+        [
+            (reply("WAIT"), "WAIT"),
+            (reply(None), ""),
+            (b'{"choices": [{"message": {"refusal": "I can not."}}]}', "I can not."),
+            (reply([{"type": "thinking", "thinking": []}, {"type": "text", "text": "WA"}, "IT"]), "WAIT"),
+            (b'{"choices": [{"message": {"content": "\\ud83d WAIT"}}]}', "\ufffd WAIT"),
+        ],
+    )
+    def test_the_text_of_an_answer_is_found(self, body, text):
+        answer = answer_of(body)
+        assert answer.text == text
+        assert Answer.model_validate_json(answer.model_dump_json()) == answer
+
+    @pytest.mark.parametrize("tokens", [-5, 1.0e300, "x", None, [], 2**60])
+    def test_counts_that_can_not_be_are_none(self, tokens):
+        assert answer_of(reply("WAIT", usage={"prompt_tokens": tokens, "completion_tokens": 7})).input_tokens == 0
+
+    @pytest.mark.parametrize(
+        ("body", "said"),
+        [
+            (b'{"error": {"message": "Rate limit exceeded"}}', "Rate limit exceeded$"),
+            (b'{"error": "overloaded"}', "overloaded$"),
+            (b'{"choices": [], "usage": null}', r'\{"choices": \[\], "usage": null\}$'),
+            (b'{"choices": [{"text": "WAIT"}]}', "WAIT"),
+            (b"data: {}", "data: {}$"),
+            (b"<html>Log in", "<html>Log in$"),
+            (b"[" * 100_000, r"\[\["),
+        ],
+    )
+    def test_without_an_answer_what_the_service_says_is_told(self, body, said):
+        with pytest.raises(NoAnswerError, match=f"^HTTP 200 without an answer: .*{said}"):
+            answer_of(body)
+
+    _VALUES = st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(st.sampled_from(("choices", "message", "content", "text", "usage", "error")), inner)
+        ),
+        max_leaves=8,
+    )
+
+    @QUICK
+    @given(
+        st.binary(max_size=60)
+        | st.builds(lambda value: json.dumps(value).encode(), _VALUES)
+        | st.builds(reply, _VALUES)
+    )
+    def test_any_reply_is_an_answer_or_none(self, body):
+        with contextlib.suppress(NoAnswerError):
+            answer = answer_of(body)
+            assert Answer.model_validate_json(to_line(answer.model_dump())) == answer
+
+    @QUICK
+    @given(st.text(max_size=200), st.text(max_size=10))
+    @example("GO " * 30_000, "")
+    def test_any_text_is_a_route_on_the_map_or_a_fault(self, text, reason):
+        route, said = (decision := read_decision(text, (1, 1), 5, reason)).route, decision.said
+        assert all(0 <= row < 5 and 0 <= column < 5 for row, column in route)
+        assert len(said) < 120
+        assert not (route and decision.fault)
+
+    def test_any_status_ends_in_one_line_without_the_key(self, serve, monkeypatch):
+        monkeypatch.setenv("OPENAI_API_KEY", SECRET)
+        service = serve()
+        config = LLMConfig(**service.config | {"max_retries": 0})
+
+        @QUICK
+        @given(st.integers(200, 599), st.text(max_size=20) | st.just("{}"), st.booleans())
+        @example(401, "Incorrect API key provided: Bearer {}", True)
+        def ask(status, text, is_json):
+            text = text.replace("{}", SECRET)
+            service.status = status
+            service.reply = json.dumps({"error": {"message": text}} if is_json else [text]).encode()
+            with pytest.raises(RunError) as caught:
+                ask_service([], config)
+            assert SECRET not in str(caught.value)
+            assert len(str(caught.value)) < 500
+
+        ask()
+
+
+class TestSecrets:
+    @pytest.mark.parametrize(
+        ("values", "said"),
+        [
+            ({"key_variable": SECRET}, "expected key_variable as the name of a variable that is set"),
+            ({"key_variable": "AKIASECRET1234567890"}, "expected key_variable as the name of a variable that is set"),
+            ({"extra": json.dumps({"api_key": SECRET})}, "found a field 'api_key'"),
+            ({"extra": json.dumps({"extra_headers": [{"X-Auth-Token": [SECRET]}]})}, "found a field 'X-Auth-Token'"),
+            ({"extra": "{api_key: " + SECRET}, "expected extra as a JSON object"),
+            ({"base_url": f"http://me:{SECRET}@host/v1"}, "expected base_url without a user, a password or a query"),
+            ({"base_url": f"http://me:{SECRET}/v1"}, "expected base_url like"),
+            ({"base_url": f"https://host/v1?key={SECRET}"}, "expected base_url without a user, a password or a query"),
+        ],
+    )
+    def test_a_secret_in_the_config_is_refused_and_not_shown(self, command, tmp_path, values, said):
+        words = [word for name, value in values.items() for word in ("--set", f"{name}={value}")]
+        status, _, errors = command("eval", "--agent", "llm", "--set", "model=m", *words, "--out", "run")
+        assert (status, errors.count("\n")) == (2, 1)
+        assert said in errors
+        assert "SECRET" not in errors
+        assert not (tmp_path / "run").exists()
+
+    @pytest.mark.parametrize(
+        "fields", [{"max_completion_tokens": 9}, {"stop": ["\n\n"]}, {"prompt_cache_key": "mazes"}]
+    )
+    def test_other_fields_of_a_request_are_taken(self, fields):
+        assert LLMConfig(extra=json.dumps(fields)).sampling.items() >= fields.items()
+
+    @pytest.mark.parametrize("key", [f"{SECRET}\n{SECRET}", f"{SECRET}\r", f"\u200b{SECRET}", f"{SECRET} x"])
+    def test_a_key_that_no_header_can_hold_is_refused_before_the_first_request(self, tmp_path, serve, monkeypatch, key):
+        monkeypatch.setenv("OPENAI_API_KEY", f"{key}x")
+        service = serve()
+        with pytest.raises(InputError, match=r"^OPENAI_API_KEY: expected .* ASCII characters, found U\+") as caught:
+            evaluate("llm", out=tmp_path / "run", overrides=service.config, **ONE)
+        assert SECRET not in str(caught.value)
+        assert service.counts["requests"] == 0
+        assert not (tmp_path / "run").exists()
+
+    def test_the_key_is_in_no_file_whatever_the_service_repeats(self, tmp_path, serve, monkeypatch):
+        monkeypatch.setenv("OPENAI_API_KEY", SECRET)
+        service = serve()
+        service.reply = reply(f"Bearer {SECRET}", f"as {SECRET}", model=SECRET)
+        evaluate("llm", out=tmp_path, overrides=service.config | {"max_decisions": 1}, **ONE)
+        (answer,) = answers_of(tmp_path)
+        assert (answer["text"], answer["finish_reason"], answer["model"]) == ("Bearer ***", "as ***", "***")
+        assert not any(SECRET.encode() in content for content in files_of(tmp_path).values())
+
+    def test_a_key_in_another_value_is_refused(self, monkeypatch):
+        monkeypatch.setenv("OPENAI_API_KEY", SECRET)
+        with pytest.raises(InputError, match=r"^expected the key only in OPENAI_API_KEY, found it in base_url too$"):
+            ask_service([], LLMConfig(model="m", base_url=f"https://host/{SECRET}/v1"))
+
+
 class Service:
     """A local service that answers as the script `hope` does; `fault` says by the number of a request what fails."""
 
     def __init__(self, fault: Callable[[int], object] = lambda number: None):
         self.counts: collections.Counter = collections.Counter()
         self.keys, self.closed, lock = set(), threading.Event(), threading.Lock()
+        self.status, self.reply = 200, b""  # a reply other than the script's
         service = self
 
         class Handler(http.server.BaseHTTPRequestHandler):
@@ -133,10 +320,11 @@ class Service:
                     wrong = fault(service.counts["requests"])
                     service.counts["answers" if wrong is None else wrong] += 1
                 service.keys.add(self.headers["Authorization"])
-                content = b"{}" if wrong == "no choices" else b"<html>" if wrong == "no JSON" else service.answer(body)
+                content = b"{}" if wrong == "no choices" else b"<html>" if wrong == "no JSON" else b""
+                content = content or service.reply or service.answer(body)
                 if wrong == "too late":
                     service.closed.wait(30)
-                self.send_response(wrong if isinstance(wrong, int) else 200)
+                self.send_response(wrong if isinstance(wrong, int) else service.status)
                 self.send_header("Retry-After", "0")
                 self.send_header("Content-Length", str(len(content) + 9 * (wrong == "cut")))
                 self.end_headers()
@@ -226,11 +414,42 @@ class TestService:
         assert service.counts["requests"] < 20
 
     def test_a_run_ends_at_its_limit_of_tokens_and_goes_on_with_a_higher_one(self, unbroken, tmp_path, serve):
-        config = serve().config | {"concurrency": 1}
-        with pytest.raises(RunError, match="spent 550 tokens of token_limit 500"):
-            evaluate("llm", out=tmp_path, overrides=config | {"token_limit": 500}, **FLIPPED)
+        config = serve().config
+        said = r"spent [1-9],?\d+ tokens of token_limit 7,000, and the next answer may take [45],\d+ "
+        with pytest.raises(RunError, match=said):
+            evaluate("llm", out=tmp_path, overrides=config | {"token_limit": 7000}, **FLIPPED)
+        assert 7000 - 6000 < 110 * len(answers_of(tmp_path)) <= 7000
         evaluate("llm", out=tmp_path, overrides=config, resume=True, **FLIPPED)
         assert driven(tmp_path) == driven(unbroken)
+
+    def test_a_service_that_tells_no_usage_is_said_and_its_answers_count_as_the_most(self, tmp_path, serve, remarks):
+        service = serve()
+        service.reply = reply("WAIT")
+        config = service.config | {"max_decisions": 3, "token_limit": 9000}
+        with pytest.raises(RunError, match="of token_limit 9,000"):
+            evaluate("llm", out=tmp_path, overrides=config, **ONE)
+        assert remarks() == [
+            "agent 'llm': the service tells no usage of an answer, which counts as the most that it may take"
+        ]
+        assert len(answers_of(tmp_path)) == 1
+
+    def test_answers_without_a_decision_are_said_once_and_counted(self, command, serve):
+        service = serve()
+        service.reply = reply(None, usage={"prompt_tokens": 100, "completion_tokens": 10})
+        words = [word for item in service.config.items() for word in ("--set", "{}={}".format(*item))]
+        task = ["--track", "rebuilt", "--level", "2", "--kinds", "dfs", "--num-mazes", "1", "--size", "13"]
+        task += ["--distances", "15", "--episodes-per-distance", "1", "--split", "dev"]
+        run = ("eval", "--agent", "llm", *words, "--set", "max_decisions=3", *task)
+        status, output, errors = command(*run, "--out", "run")
+        assert status == 0
+        assert errors.count("an answer holds no text (finish_reason 'stop'), so it is no decision") == 1
+        assert "decisions 3, not done 3, input tokens 300, output tokens 30, without text 3\n" in output
+        assert summary_of(pathlib.Path("run"))["counts"]["without_text"] == 3
+
+    def test_workers_are_refused_since_tokens_are_counted_in_one_process(self, tmp_path):
+        overrides = {"model": "m", "base_url": "http://127.0.0.1:9/v1"}
+        with pytest.raises(InputError, match="agent 'llm': expected no --workers with this config, found 2"):
+            evaluate("llm", out=tmp_path / "run", workers=2, overrides=overrides, **ONE)
 
     def test_another_model_is_another_run(self, unbroken):
         with pytest.raises(InputError, match="holds another run: its config is"):
@@ -258,6 +477,14 @@ class TestReplay:
         with pytest.raises(InputError, match=said):
             evaluate("llm", out=tmp_path / "x", overrides={"model": "m", "replay": str(unbroken)} | changed, **FLIPPED)
         assert not (tmp_path / "x").exists()
+
+    @pytest.mark.parametrize(("cut", "line"), [(slice(60, None), 1), (slice(None, -20), None)])
+    def test_a_damaged_line_is_named(self, unbroken, tmp_path, cut, line):
+        lines = (unbroken / "answers.jsonl").read_bytes()
+        (tmp_path / "answers.jsonl").write_bytes(lines[cut])
+        line = line or lines.count(b"\n")
+        with pytest.raises(InputError, match=rf"expected the answer in step \d+, found line {line} of .*jsonl damaged"):
+            evaluate("llm", overrides={"model": "m", "replay": str(tmp_path)}, **FLIPPED)
 
     def test_a_line_that_was_cut_is_asked_again(self, unbroken, tmp_path, serve):
         service, lines = serve(), (unbroken / "answers.jsonl").read_bytes()

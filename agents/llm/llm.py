@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface, Report
-from mazebench.errors import InputError, UnplayableError
+from mazebench.errors import InputError, UnplayableError, remark
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 
@@ -22,12 +22,18 @@ from ..robot.map_matching import orientations
 from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.occupancy import SURE
 from ..robot.senses import Memory, Senses, report
+from .answer import Answer
 from .answers import Answers
-from .asking import Answer, LLMConfig
-from .decision import read_decision
+from .config import LLMConfig
+from .decision import CUT, FILTERED, WITHOUT_TEXT, read_decision
 from .situation import Situation
 
 _NOTES = ("decisions", "not_done", "input_tokens", "output_tokens", "seconds")  # of an episode; from the third on, sums
+_SAID = {  # once, of an answer that holds no decision
+    CUT: "an answer was cut at max_tokens {max_tokens}, which thoughts are part of",
+    FILTERED: "the service filtered an answer",
+    WITHOUT_TEXT: "an answer holds no text",
+}
 
 
 @dataclasses.dataclass
@@ -52,12 +58,14 @@ class _Driver:
             self.decisions.append(f"{self.under_way}: {outcome}")
         self.route, self.under_way = (), ""
 
-    def take(self, answer: Answer) -> None:
-        """Does as an answer says; without a route, the robot stays for a step."""
+    def take(self, answer: Answer) -> str:
+        """Does as an answer says; without a route, the robot stays for a step. Returns the answer's flaw."""
         self.notes["decisions"] += 1
         for name in _NOTES[2:]:
             self.notes[name] += getattr(answer, name)
-        decision = read_decision(answer.text, self.situation.here, len(self.situation.walls))
+        decision = read_decision(answer.text, self.situation.here, len(self.situation.walls), answer.finish_reason)
+        if decision.flaw:
+            self.notes[decision.flaw] = self.notes.get(decision.flaw, 0) + 1
         self.end_route("given up for another one")
         seen = [cell for cell in decision.route if self.situation.seen[cell] > 0]
         if fault := decision.fault or (f"a wall was seen at {seen[0]}" if seen else ""):
@@ -67,6 +75,7 @@ class _Driver:
             self.route, self.under_way = decision.route, decision.said
         else:
             self.decisions.append(f"{decision.said}: waited")
+        return decision.flaw
 
 
 class LLM(Agent):
@@ -82,7 +91,7 @@ class LLM(Agent):
         if side != size:
             raise UnplayableError(f"agent 'llm': expected the building's {size} x {size} cells, found {side} x {side}")
         self._config, self._kind, self._senses = config, interface.actions, Senses(interface, "llm")
-        self._answers = Answers(config, folder)
+        self._answers, self._flaws = Answers(config, folder), {""}
         # For each way in which the map may be turned, the place of each of its cells on the turned map, as numbers.
         turned = orientations(np.arange(size**2).reshape(size, size), 8)
         self._turned = np.argsort(turned.reshape(8, -1), axis=1)
@@ -111,7 +120,11 @@ class LLM(Agent):
         drivers = {slot: self._observe(state[slot], inputs, slot) for slot in slots}
         asking = {slot: asked for slot, driver in drivers.items() if (asked := self._question(driver))}
         for slot, answer in zip(asking, self._answers.of([*asking.values()]), strict=True):
-            drivers[slot].take(answer)
+            if (flaw := drivers[slot].take(answer)) not in self._flaws:
+                self._flaws.add(flaw)
+                said = _SAID[flaw].format(max_tokens=self._config.max_tokens)
+                why = f" (finish_reason {answer.finish_reason!r})" if answer.finish_reason else ""
+                remark(f"agent 'llm': {said}{why}, so it is no decision; such answers are counted in the summary")
         for slot, driver in drivers.items():
             # The route on the robot's grid.
             (turn, row, column), size = driver.placement, len(driver.situation.walls)

@@ -23,7 +23,9 @@ _DRAWN = ("map", "lidar", "depth", "labels")  # views that need no rendering, an
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
-    agent: Annotated[str | None, typer.Option(help=f"Who drives; {_AGENT} if not given.")] = None,
+    agent: Annotated[
+        str | None, typer.Option(help=f"Who drives; {_AGENT} if not given. With --results, a module:Class of theirs.")
+    ] = None,
     results: Annotated[
         pathlib.Path | None, typer.Option(help="A finished evaluation: its agent runs --episode of it again.")
     ] = None,
@@ -40,7 +42,7 @@ def render(
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     if (results is None) != (episode is None):
         raise InputError("expected --results and --episode together, found one of them")
-    if results and (chosen := [*values.keys() - {"checkpoint", "overrides"}, *(["agent"] if agent else [])]):
+    if results and (chosen := [*values.keys() - {"checkpoint", "overrides"}]):
         raise InputError(f"--results has an agent and options of its own; found --{min(chosen).replace('_', '-')}")
     from mazebench.results.reading import load_result  # imported late: it takes long
 
@@ -50,7 +52,7 @@ def render(
     from mazebench import film
 
     if result and episode is not None:
-        outcome = film.film_result(result, episode, out, view, pixels, **values)
+        outcome = film.film_result(result, episode, out, view, pixels, agent, **values)
     else:
         options = EvalOptions(agent=agent or _AGENT, task=task, **options_in(values, EvalOptions))
         outcome = film.film_episode(options, out, view, pixels)

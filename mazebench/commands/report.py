@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mazebench import stopping
-from mazebench.errors import InputError
+from mazebench.errors import InputError, one_line
 
 
 def report(
@@ -25,4 +25,4 @@ def report(
     with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it again",)):
         reported = write_report(results, out)
     agents = sorted({result.label for result in reported})
-    print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}")
+    print(one_line(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}"))

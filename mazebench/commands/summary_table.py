@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from rich import box
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mazebench.constants import ON_TIME
+from mazebench.errors import one_line
 from mazebench.results.comparison import Row
 from mazebench.results.metrics import HEADLINE, METRICS, Metric
 from mazebench.results.naming import noise_in_words, title_of
@@ -85,13 +87,13 @@ def print_table(
     console = Console(markup=False, emoji=False)
     if not console.is_terminal:
         console = Console(markup=False, emoji=False, width=_ANY_WIDTH)
-    console.print(title, style="italic", highlight=False)
+    console.print(one_line(title), style="italic", highlight=False)  # folders may have any names
     table = Table(box=box.SIMPLE, pad_edge=False, padding=0, show_edge=False)
     for name in head:
         table.add_column(name, justify="right", overflow="fold")
     table.columns[0].justify = "right" if all(row[0].isdigit() for row in rows) else "left"
     for number, row in enumerate([*rows, *totals], 1):
-        table.add_row(*row, end_section=number == len(rows))
+        table.add_row(*map(one_line, row), end_section=number == len(rows))
     console.print(table)
 
 
@@ -126,3 +128,8 @@ def _print_notes(*summaries: Summary) -> None:
     print(_NOTE)
     if any(summary.overall.recall for summary in summaries):
         print(_RECALL_NOTE)
+    for agent in dict.fromkeys(summary.who for summary in summaries):
+        counts = sum((Counter(each.counts) for each in summaries if each.who == agent), Counter())
+        if counts:
+            named = ", ".join(f"{name.replace('_', ' ')} {count:,}" for name, count in counts.items())
+            print(f"{agent}, in all episodes: {named}")

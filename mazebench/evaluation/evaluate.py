@@ -21,7 +21,8 @@ from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.options import check_names, options_in
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
-from mazebench.results.records import Summary
+from mazebench.results.records import Summary, counts_in
+from mazebench.storage.files import locked
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import TaskOptions
 
@@ -94,6 +95,7 @@ def run_evaluation(
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
+    plan.check_workers(run.workers)
     if plan.remark:
         remark(plan.remark)
     if plan.provenance.agent_code_sha256 is None:
@@ -121,7 +123,7 @@ def run_plan(
         summary = load_result(folder).summary
         progress(num_trials, num_trials)
         return summary
-    with Store(folder, plan, resume=run.resume, record=record) as store:
+    with locked(folder, "evaluation"), Store(folder, plan, resume=run.resume, record=record) as store:
         progress(store.num_ended, num_trials)
         for results in pool.run(plan, _cut(store, pool, run.num_envs)):
             if results:
@@ -141,6 +143,7 @@ def run_plan(
             episodes=num_trials,
             provenance=plan.provenance,
             **metrics.summarize(records),
+            counts=counts_in(records),
         )
         store.finish(records, summary)
     return summary

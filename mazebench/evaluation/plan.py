@@ -67,6 +67,12 @@ class Plan:
         chosen, usual = (config.identity() if config else {} for config in configs)
         return {name: value for name, value in chosen.items() if value != usual[name]}
 
+    def check_workers(self, workers: int) -> None:
+        """Raises `InputError` if worker processes are asked for, and the agent's config rules them out."""
+        config = config_of(self.options, self.agent_class)
+        if workers and config is not None and config.needs_one_process:
+            raise InputError(f"agent {self.options.agent!r}: expected no --workers with this config, found {workers}")
+
     @property
     def remark(self) -> str | None:
         """A line of what a user should know before the evaluation; None if there is nothing."""

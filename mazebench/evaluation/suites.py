@@ -153,6 +153,8 @@ def run_suite(
         for agent, folder in _folders(agents).items()
         for part in SUITES[suite]
     }
+    for plan in plans.values():
+        plan.check_workers(run.workers)
     plans = _playable(plans, out, suite)
     with Pool(run.workers) as pool:
         make_folder(out)

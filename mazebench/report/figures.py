@@ -40,6 +40,7 @@ STYLE: Any = {
     "pdf.fonttype": 42,
     "svg.fonttype": "none",
     "svg.hashsalt": "mazebench",  # the same content gives the same bytes
+    "text.usetex": False,  # whatever a matplotlibrc in the working folder says
     "text.parse_math": False,  # agents' names are not formulas
 }
 _DODGE, _DODGES = 0.12, 0.72  # of the smallest step between levels: two agents are so far apart, all of them at most

@@ -47,7 +47,7 @@ class Entry(pydantic.BaseModel):
     agent: Name
     division: str = LIDAR
     privileged: bool
-    code: tuple[str, ...]  # package and version, or "file", and the SHA-256 of the code or "without hash"
+    code: tuple[Name, ...]  # package and version, or "file", and the SHA-256 of the code or "without hash"
     checkpoints: tuple[str, ...]  # SHA-256
     on_time: tuple[Share, Share, Share]  # of all episodes, with its 95 % interval
     success: Share  # of all episodes

@@ -49,7 +49,7 @@ class Table:
         wide = [self.wide(metric) for metric in self.metrics]
         return {
             ".md": "\n".join(map(to_markdown, wide)),
-            ".csv": self.values.to_csv(index=False, float_format="%.6g"),
+            ".csv": _without_formulas(self.values).to_csv(index=False, float_format="%.6g"),
             ".tex": "\n".join(each.to_latex(escape=True) for each in wide),
         }
 
@@ -74,6 +74,12 @@ def to_markdown(frame: pd.DataFrame) -> str:
 def escape_markdown(text: str) -> str:
     """Returns the Markdown that shows `text` as it is."""
     return re.sub(r"([\\`*_{}\[\]|<>~&$])", r"\\\1", " ".join(text.split()))
+
+
+def _without_formulas(values: pd.DataFrame) -> pd.DataFrame:
+    """Returns values whose names no spreadsheet takes for formulas: a quote stands before them."""
+    names = {name: values[name].astype(str).str.replace(r"^(?=[=+@-])", "'", regex=True) for name in ("row", "column")}
+    return values.assign(**names)
 
 
 def _format(value: float, low95: float, high95: float, runs: Any, mark: str, **_: Any) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from mazebench.errors import InputError, remark, remarks_to
+from mazebench.errors import InputError, one_line, remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
 from mazebench.report.figures import draw_table, save
 from mazebench.report.page import build_page
@@ -104,7 +104,9 @@ def provenance_of(results: Sequence[ReportedResult]) -> pd.DataFrame:
             "machine": ", ".join(f"{key} {value}" for key, value in provenance.machine.items()),
             "command": " ".join(provenance.command),
         }
-        origins.append(origin | {"results": 1, "episodes": len(result.episodes), "in": os.path.relpath(result.folder)})
+        origins.append(
+            origin | {"results": 1, "episodes": len(result.episodes), "in": one_line(os.path.relpath(result.folder))}
+        )
     rows = pd.DataFrame(origins)
     return rows.groupby(list(rows)[:-3], sort=False, as_index=False).agg(
         {"results": "sum", "episodes": "sum", "in": lambda folders: os.path.commonpath(list(folders))}

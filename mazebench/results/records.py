@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import collections
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 import pydantic
@@ -28,14 +29,31 @@ StoredTask = Annotated[
     pydantic.InstanceOf[TaskOptions],
     pydantic.BeforeValidator(lambda task: TaskOptions.from_json(task) if isinstance(task, dict) else task),
 ]
-# Results of others may have any name; what does not print, such as commands to a terminal, is escaped.
 Name = Annotated[str, pydantic.Field(min_length=1, max_length=1000), pydantic.AfterValidator(one_line)]
+
+
+def _printing(value: Any) -> Any:
+    """Returns a value of JSON with what does not print escaped, such as commands to a terminal."""
+    if isinstance(value, str):
+        return one_line(value)
+    if isinstance(value, dict):
+        return {one_line(name) if isinstance(name, str) else name: _printing(each) for name, each in value.items()}
+    return type(value)(map(_printing, value)) if type(value) in (list, tuple) else value
 
 
 class _Stored(pydantic.BaseModel):
     """Base of what is stored as JSON: values of the declared types, finite numbers, other keys kept."""
 
     model_config = pydantic.ConfigDict(frozen=True, extra="allow", strict=True, allow_inf_nan=False)
+
+    @pydantic.model_validator(mode="after")
+    def _escape(self) -> Self:
+        """Escapes what does not print in all texts and names of keys, but for an agent's own `notes`."""
+        for values in (self.__dict__, self.__pydantic_extra__ or {}):
+            escaped = {one_line(name): value if name == "notes" else _printing(value) for name, value in values.items()}
+            values.clear()
+            values.update(escaped)
+        return self
 
 
 class Record(_Stored):
@@ -131,6 +149,7 @@ class Summary(_Stored):
     provenance: Provenance
     overall: Figures
     by_distance: dict[str, Figures]
+    counts: dict[str, int] = {}  # sums of the whole numbers that the agent noted of episodes
     by_fact: dict[str, Figures] = {}  # of the groups that a track tells apart: "blocked", "not blocked", kinds of mazes
 
     @property
@@ -156,6 +175,17 @@ class Summary(_Stored):
         """Returns the content of `summary.json`."""
         values = self.model_dump(exclude={"task"}, exclude_defaults=True)
         return {"agent": self.agent, "task": self.task.to_json(), **values}
+
+
+def counts_in(records: Sequence[Record]) -> dict[str, int]:
+    """Returns sums of the whole numbers in the agent's notes; of several goals, the last leg has those of all."""
+    last = {record.episode: (record.model_extra or {}).get("notes") for record in records}
+    counts: collections.Counter[str] = collections.Counter()
+    for notes in last.values():
+        counts.update(
+            {name: value for name, value in notes.items() if type(value) is int} if isinstance(notes, dict) else {}
+        )
+    return dict(counts)
 
 
 def column(records: Sequence[Record], name: str) -> np.ndarray:

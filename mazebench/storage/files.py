@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import io
 import os
 import pathlib
@@ -71,6 +72,29 @@ def make_folder(path: pathlib.Path) -> None:
     """Makes a folder, and those that it lies in, unless it exists."""
     with writing_to(path):
         path.mkdir(parents=True, exist_ok=True)
+
+
+@contextlib.contextmanager
+def locked(folder: pathlib.Path, kind: str) -> Iterator[None]:
+    """Makes a folder, and keeps out other processes that lock it, until the block or this process ends.
+
+    Raises:
+      InputError: if another one has locked it, which the message calls a `kind`.
+    """
+    make_folder(folder)
+    with writing_to(folder):
+        descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        raise InputError(f"{folder}: another {kind} writes there; end it, or name another folder") from error
+    except OSError:  # a file system without locks
+        pass
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 @contextlib.contextmanager

@@ -5,8 +5,8 @@ A checkpoint is a milestone, where the agent is evaluated, or a savepoint, from 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import fcntl
 import json
 import os
 import pathlib
@@ -18,7 +18,7 @@ from typing import Any, Self
 import pydantic
 
 from mazebench.errors import InputError, RunError, describe_fault
-from mazebench.storage.files import make_folder, open_whole, writing_to
+from mazebench.storage.files import locked, make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 from mazebench.training.counters import Counters
 
@@ -45,15 +45,8 @@ class RunFolder:
         if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
             raise InputError(f"{self.path}: expected an empty folder or a training run's, found {found[0]!r} in it")
         make_folder(self.path / CHECKPOINTS)
-        # Other trainings are kept out until this descriptor is closed, or its process ends.
-        self._lock = os.open(path / CHECKPOINTS, os.O_RDONLY)
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            os.close(self._lock)
-            raise InputError(f"{path}: another training writes there; end it, or name another folder") from error
-        except OSError:  # a file system without locks
-            pass
+        self._lock = contextlib.ExitStack()
+        self._lock.enter_context(locked(path, "training"))
         for half_written in (self.path / CHECKPOINTS).glob("*.tmp"):
             if _CHECKPOINT_NAME.fullmatch(half_written.stem):
                 shutil.rmtree(half_written, ignore_errors=True)
@@ -64,7 +57,7 @@ class RunFolder:
     def __exit__(self, *exception: object) -> None:
         if self._board is not None:
             self._board.close()
-        os.close(self._lock)
+        self._lock.close()
 
     def save_checkpoint(self, counters: Counters, save: Callable[[pathlib.Path], None]) -> None:
         """Lets `save` fill a new checkpoint, which then takes its place at once; the last milestone is kept beside it.
