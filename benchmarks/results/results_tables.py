@@ -217,7 +217,7 @@ def by_row(head: str, rows: Mapping[str, tuple[str, str]], metrics: Sequence[str
         [text, str(len(own := kept.of(agent, setting))), *(_interval(metric, own) for metric in metrics)]
         for text, (agent, setting) in rows.items()
     ]
-    return format_table([head, "episodes", *(METRICS[metric] for metric in metrics)], lines)
+    return format_table([head, "episodes", *(METRICS[metric].title for metric in metrics)], lines)
 
 
 def plans_in_words(kept: Kept) -> str:
