@@ -65,7 +65,7 @@ ODOMETRY = "#0b7a8a"
 OBSERVED = 6  # seed of the episode
 SEEN = 4  # likewise of the places in all looks
 STRIDE = 0.15  # m, of a drawn shortest path
-EXPLORED = 10  # the episode in the explorer
+EXPLORED = 28  # the episode in the explorer
 FILMED = 94  # the episode: the navigator finds a door closed and drives around
 VIEWS = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
 SIDE, GAP, TITLE, LEGEND = 256, 12, 32, 70  # pixels; three views and four gaps are 816 wide
@@ -345,7 +345,7 @@ def draw_explorer() -> None:
         page = re.sub("<meta http-equiv[^>]*>", hidden, page)
         (folder / "page.html").write_text(page, encoding="utf-8")
         look = ("--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=20000")
-        size, target = "--window-size=1100,720", f"--screenshot={FOLDER / 'report-explorer.png'}"
+        size, target = "--window-size=1100,690", f"--screenshot={FOLDER / 'report-explorer.png'}"
         address = (folder / "page.html").as_uri() + f"#episode=0-{EXPLORED}"
         subprocess.run([browser, *look, size, target, address], check=True, capture_output=True)
 
@@ -390,7 +390,6 @@ def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **lo
 
 
 if __name__ == "__main__":
-    for draw in (film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes):
-        draw()
-    for draw in (draw_looks, draw_shortest_paths, draw_explorer):
+    of_episodes = film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes
+    for draw in (*of_episodes, draw_looks, draw_shortest_paths, draw_explorer):
         draw()
