@@ -205,6 +205,7 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks():
     torch.testing.assert_close(state.code.positions[:, :2], torch.tensor([[5.0, 1.0], [4.0, 2.0]]))
 
 
+@pytest.mark.slow
 def test_mmn_after_some_seconds_beats_random_in_a_small_maze():
     """The learning test: goals 2 and 3 cells away in 25 steps."""
     values = {
