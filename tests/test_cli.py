@@ -18,7 +18,7 @@ from mazebench import __version__, cli
 from mazebench.agent_loading import agent_names
 from mazebench.commands.option_parameters import parse_numbers, takes_options
 from mazebench.errors import InputError
-from mazebench.evaluation.suites import SUITES
+from mazebench.evaluation.suites import SUITES, Part
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.text import format_maze
 from mazebench.tasks.task_options import TaskOptions
@@ -211,11 +211,13 @@ class TestEval:
 
     def test_a_suite_is_run_and_compared(self, command, tmp_path, monkeypatch):
         parts = ["local-21", "hierarchical-13-k5", "warp-0.1"]
-        monkeypatch.setitem(SUITES, "some", tuple(part for part in SUITES["quick"] if part.name in parts))
+        near, warped = TaskOptions(size=21, distances=(2, 3)), TaskOptions(map_warp=0.1, distances=(2,))
+        tasks = (near, TaskOptions(task="hierarchical", landmark_distance=5), warped)
+        monkeypatch.setitem(SUITES, "some", tuple(map(Part, parts, tasks, (1, 1, 1))))
         some = ("eval", "--suite", "some", "--agent", "random", "--agent", "planner", "--out", "run")
         status, output, errors = command(*some)
         assert status == 0
-        assert "some, random, planner: 280 of 280 episodes\n" in errors
+        assert "some, random, planner: 160 of 160 episodes\n" in errors
         assert "random: suite some" in output
         assert [line.split()[0] for line in output.splitlines() if line.startswith(tuple(parts))] == parts * 2
         assert all((tmp_path / "run" / "planner" / part / "trajectories.npz").exists() for part in parts)
@@ -230,7 +232,7 @@ class TestEval:
         assert "A - B, SPL" in near
         assert "hierarchical-13-k5 1.00 0.00 +1.00 [" in compared
         status, text, _ = command("compare", "run/planner/local-21", "run/random/local-21", "--json")
-        assert list(json.loads(text)["by_distance"]) == ["2", "6", "10"]
+        assert list(json.loads(text)["by_distance"]) == ["2", "3"]
         for a, b, said in [
             ("run", "run/planner", "run: expected one agent's results, found 2 agents'; name one of: run/random, run"),
             ("run/planner", "run/random/local-21", "expected results of the same parts, found local-21, "),

@@ -113,6 +113,7 @@ def on_one_core() -> None:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
 
+@pytest.mark.slow
 def test_files_do_not_depend_on_the_surroundings(tmp_path):
     """Hash seeds, locales, time zones, threads, cores and the working directory make no difference to any command."""
     hashes = run_commands(tmp_path / "a", SURROUNDINGS["plain"])

@@ -148,8 +148,8 @@ class TestPartsThatCannotBePlayed:
     def mixed(self, monkeypatch):
         parts = (
             *TINY[:2],
-            Part("corners", TaskOptions(task="hierarchical")),
-            Part("flips", TaskOptions(task="hierarchical", map_flip=0.1)),
+            Part("corners", TaskOptions(task="hierarchical", time_limit=5)),
+            Part("flips", TaskOptions(task="hierarchical", map_flip=0.1, time_limit=5)),
         )
         monkeypatch.setitem(SUITES, "mixed", parts)
 

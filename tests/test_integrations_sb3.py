@@ -104,7 +104,7 @@ def test_ways_are_read_as_by_the_neural_planner():
     observation = envs.reset()
     state = agent.initial_state(3)
     agent.act(inputs_of(observation, np.ones(3, dtype=bool)), state, explore=True)
-    grids = torch.tensor(np.stack(state.choice.grids))
+    grids = torch.tensor(np.stack(state.choice.shared))
     walls = 255 * (grids[:, 0] > 127)
     grids[:, 0], grids[:, 1], grids[:, 2] = walls, walls, 128  # the map as it is shown, and nothing that was sensed
     with torch.no_grad():

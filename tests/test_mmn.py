@@ -212,6 +212,7 @@ def test_an_evaluation_sets_the_number_of_simulations():
         assert (agent.config.num_eval_simulations, agent.config.num_simulations) == (number, 8)
 
 
+@pytest.mark.slow
 def test_mmn_after_some_seconds_beats_random_in_a_small_maze():
     """The learning test: goals 2 and 3 cells away in 25 steps."""
     values = {

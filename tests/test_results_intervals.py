@@ -166,6 +166,6 @@ class TestRunsAndMazes:
 
 @pytest.mark.slow
 def test_two_cells_of_the_published_simulation_of_coverage():
-    found = runpy.run_path(str(pathlib.Path(__file__).parent.parent / "docs" / "examples" / "coverage.py"))
+    found = runpy.run_path(str(pathlib.Path(__file__).parent.parent / "docs" / "examples" / "interval_coverage.py"))
     assert f"{found['of_one_run']('success', 48, 5, 0.2, 0.9, 2_000):.2f}" == "0.95"
     assert f"{found['of_several_runs'](3, 1.0, 0.95, 2_000):.2f}" == "0.92"

@@ -1,6 +1,6 @@
 """Shares of simulated evaluations whose 95 % intervals hold the true mean: the numbers of docs/intervals.md.
 
-python coverage.py [NUMBER]      of evaluations in each cell of the tables, 2,000 by default
+python interval_coverage.py [NUMBER]      of evaluations in each cell of the tables, 2,000 by default
 """
 
 from __future__ import annotations
