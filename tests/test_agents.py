@@ -135,7 +135,8 @@ class TestConformance:
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
             mazes = (generate("dfs", 7, np.random.default_rng(0), "m"),)
-            task = Task.of(mazes=mazes, distances=(1, 2, 3), context_size=agent_class.context_size(7))
+            needed = {"context_size": agent_class.context_size(7), "sensors": agent_class.needs_sensors}
+            task = Task.of(mazes=mazes, distances=(1, 2, 3), **needed)
             agent_class.build_learner(task).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
         check_agent(agent_class, checkpoint=checkpoint)

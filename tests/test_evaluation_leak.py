@@ -42,7 +42,8 @@ def test_results_do_not_depend_on_what_info_tells_of_the_truth(monkeypatch, tmp_
         return records_of(out)
 
     honest, infos = play(tmp_path / "honest"), Rules.infos
-    recorded = ("is_first", "success", "goal_reached", "steps", "path_length", "blocked")
+    # Of what records are made: recalls compare reported poses with the true ones.
+    recorded = ("is_first", "success", "goal_reached", "steps", "path_length", "blocked", "position", "yaw")
 
     def lying(rules: Rules) -> dict[str, np.ndarray]:
         told = infos(rules)

@@ -26,6 +26,7 @@ from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.trials import draw_trials
+from mazebench.world.bodies import SLIDER
 
 HALL = dataclasses.replace(field(130), cell_size=0.5)
 TASKS = [("local", 1), ("building", 1), ("building", 3), ("rebuilt", 1), ("adrift", 3), ("rough", 2)]
@@ -182,7 +183,7 @@ class TestMetres:
         whole, fine = (Task.of("building", mazes=each, distances=(15, 20)) for each in (maze, half))
         assert (whole.distances, fine.distances) == ((15, 20), (30, 40))
         for task in (whole, fine):
-            assert default_time_limit(max(task.distances), task.cell_size, track="building") == 170
+            assert default_time_limit(max(task.distances), task.cell_size, SLIDER, track="building") == 170
         assert fine.options.distances == (15, 20)
 
     def test_records_keep_cells_and_summaries_have_metres(self, tmp_path):

@@ -83,7 +83,7 @@ def test_the_user_chooses_before_the_learner_does(tmp_path):
         ({"task": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),
         ({"distances": 60}, "expected distances of at most "),
-        ({"agent": "planner"}, "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, mmn"),
+        ({"agent": "planner"}, "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, map-policy, mmn"),
         ({"overrides": {"colour": "red"}}, "unknown config key 'colour'"),
     ],
 )
