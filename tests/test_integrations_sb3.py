@@ -108,7 +108,7 @@ def test_ways_are_read_as_by_the_neural_planner():
     walls = 255 * (grids[:, 0] > 127)
     grids[:, 0], grids[:, 1], grids[:, 2] = walls, walls, 128  # the map as it is shown, and nothing that was sensed
     with torch.no_grad():
-        expected = agent.network.features(agent.network.plan(grids), torch.arange(3), state.choice.situation)
+        expected = agent.network.features(agent.network.plan(grids), torch.arange(3), state.choice.parts)
     found = reader({name: torch.as_tensor(values) for name, values in observation.items()})
     torch.testing.assert_close(found[:, :NUM_READ], expected[:, :NUM_READ])  # at points around the body
     differ = (found - expected).abs() > 0.03  # the lidar's noise; rays that are lost or pass a corner differ by more
