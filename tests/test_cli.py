@@ -213,7 +213,7 @@ class TestEval:
         parts = ["local-21", "hierarchical-13-k5", "warp-0.1"]
         near, warped = TaskOptions(size=21, distances=(2, 3)), TaskOptions(map_warp=0.1, distances=(2,))
         tasks = (near, TaskOptions(task="hierarchical", landmark_distance=5), warped)
-        monkeypatch.setitem(SUITES, "some", tuple(map(Part, parts, tasks, (1, 1, 1))))
+        monkeypatch.setitem(SUITES, "some", tuple(map(Part, parts, tasks, (1, None, 1))))
         some = ("eval", "--suite", "some", "--agent", "random", "--agent", "planner", "--out", "run")
         status, output, errors = command(*some)
         assert status == 0
