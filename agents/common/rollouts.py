@@ -43,7 +43,7 @@ class RolloutConfig(Options):
 
 
 class Seen(NamedTuple):
-    """What a network read in a step in B environments."""
+    """The readings of a network in a step in B environments."""
 
     shared: list[np.ndarray]  # B of [...]; the same object for all steps that share it, such as those on one map
     parts: tuple[Any, ...] = ()  # [B, ...] each, the rest

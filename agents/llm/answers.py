@@ -34,11 +34,10 @@ class Answers:
         self._kept = {each.prompt: each for each in read_lines(self._file, Answer)} if self._file else {}
         if self._file and self._file.exists() and not self._file.read_bytes().endswith(b"\n"):
             self._write("\n")  # ends a line that a kill cut short
-        files = sorted(pathlib.Path(config.replay).rglob(ANSWERS)) if config.replay else []
-        self._replayed = {each.prompt: each for file in files for each in read_lines(file, Answer)}
-        self._damaged = _damaged_line(files) if config.replay else ""
+        self._files = sorted(pathlib.Path(config.replay).rglob(ANSWERS)) if config.replay else []
+        self._replayed = {each.prompt: each for file in self._files for each in read_lines(file, Answer)}
         if config.replay and not self._replayed:
-            found = self._damaged or "found none"
+            found = _damaged_line(self._files) or "found none"
             raise InputError(f"{config.replay}: expected {ANSWERS} to replay in it or below, {found}")
         # Tokens that were spent, and those that requests under way may take; of answers without usage, the most.
         self._spent, self._under_way = sum(self._cost(each, 0) for each in self._kept.values()), 0
@@ -64,7 +63,7 @@ class Answers:
             return
         if self._config.replay:
             if key not in self._replayed:
-                found = self._damaged or "found none"
+                found = _damaged_line(self._files) or "found none"
                 raise InputError(f"{self._config.replay}: expected the answer in step {situation.step}, {found}")
             answer = self._replayed[key]
         else:

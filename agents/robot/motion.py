@@ -26,7 +26,7 @@ _CONTACT_STIFFNESS = (_CONTACT_DAMPING / (2 * CONTACT_SOLREF[1])) ** 2
 
 
 class Motion(NamedTuple):
-    """What the motion of a body depends on, in numbers for kernels; see `Body`."""
+    """The numbers of a body on which its motion depends, for kernels; see `Body`."""
 
     mass: float  # kg
     damping: float  # N s/m

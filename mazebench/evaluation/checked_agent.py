@@ -14,6 +14,7 @@ from mazebench.agent_loading import source_line
 from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, RunError, describe_error
 from mazebench.stopping import Stopped
+from mazebench.tasks.sensors import LIDAR
 
 
 class AgentError(RunError):
@@ -50,6 +51,11 @@ def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
     """Returns the M that the agent `name` needs in mazes of `size` cells a side."""
     with calling(name, "context_size"):
         return int(agent_class.context_size(size))
+
+
+def sensors_of(agent_class: type[Agent], named: tuple[str, ...]) -> tuple[str, ...]:
+    """Returns the sensors of an agent's task: those named, and those that it needs if only the lidar may be named."""
+    return tuple(dict.fromkeys((*named, *agent_class.needs_sensors))) if named in ((), (LIDAR,)) else named
 
 
 class CheckedAgent(Agent):

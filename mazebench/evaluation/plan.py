@@ -14,14 +14,13 @@ from mazebench.agent import Agent, AgentConfig
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
+from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of, sensors_of
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
 from mazebench.options import override
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task import Task, options_of, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.trials import Trial, counting_option, select_trials
@@ -227,8 +226,7 @@ def task_as_played(
     chosen: dict[str, Any] = {}
     if options.actions is None and "six" not in plays:
         chosen["actions"] = plays[0]
-    if options.sensors in ((), (LIDAR,)):
-        chosen["sensors"] = tuple(dict.fromkeys((*options.sensors, *agent_class.needs_sensors)))
+    chosen["sensors"] = sensors_of(agent_class, options.sensors)
     if isinstance(asked, TaskOptions):
         chosen["context_size"] = None
     chosen = {name: value for name, value in chosen.items() if value != getattr(options, name)}

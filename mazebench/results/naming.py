@@ -1,4 +1,4 @@
-"""What results call a task: its names and words, the setting by which results are grouped, and the order of tables."""
+"""The names of a task in results: its words, the setting by which results are grouped, and the order of tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is frozen with the benchmark by name or number: the tracks, and the random streams of an episode.
+"""Names and numbers that are frozen with the benchmark: the tracks, and the random streams of an episode.
 
 This module imports no library, for `import mazebench` registers an environment for each track.
 """

@@ -22,11 +22,10 @@ import numpy as np
 from mazebench import stopping
 from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.checked_agent import context_size_of
+from mazebench.evaluation.checked_agent import context_size_of, sensors_of
 from mazebench.evaluation.provenance import code_hash
 from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
-from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task import Task, as_asked, in_the_same_mazes, options_of, resolve
 from mazebench.tasks.task_options import PROGRESS, TaskOptions
 from mazebench.training.collector import Collector
@@ -320,8 +319,8 @@ def training_task(
     has_one_goal = options.track is not None or options.pairs == "fixed"
     one_goal = {"num_goals": 1} if has_one_goal or options.reward == PROGRESS else {}
     left_open = {name: value for name, value in defaults.items() if name not in given}
-    if agent_class.needs_sensors and options.sensors in ((), (LIDAR,)):  # as in an evaluation
-        left_open["sensors"] = tuple(dict.fromkeys((*options.sensors, *agent_class.needs_sensors)))
+    if agent_class.needs_sensors:
+        left_open["sensors"] = sensors_of(agent_class, options.sensors)
     asked = asked.replace(**left_open | one_goal)
     task = resolve(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
     if needed := [name for name in agent_class.needs_shown if name in task.options.hide]:
