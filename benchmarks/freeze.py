@@ -8,6 +8,7 @@ import io
 import json
 import pathlib
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -54,27 +55,35 @@ def draw_mazes(size: int) -> list[Maze]:
 def format_trials(task: Task, trials: list[Trial]) -> str:
     """Returns the text of a file of frozen episodes, with the steps that the oracle takes in each."""
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    csv.writer(text, lineterminator="\n").writerows([COLUMNS, *rows_of_trials(task, trials)])
+    return text.getvalue()
+
+
+def rows_of_trials(task: Task, trials: list[Trial]) -> list[list[Any]]:
+    """Returns the values of `COLUMNS` for each episode, with the steps that the oracle takes in it."""
+    rows = []
     for trial, steps in zip(trials, measure_oracle_steps(task, trials), strict=True):
         episode = trial.episode
         shortest = f"{trial.shortest_path:.9f}"  # nanometres: the same on every machine
         drawn = [episode.maze, *episode.start, *episode.goal, trial.distance, repr(episode.yaw), episode.seed]
-        writer.writerow([*drawn, shortest, steps])
-    return text.getvalue()
+        rows.append([*drawn, shortest, steps])
+    return rows
 
 
-def write_benchmark(folder: pathlib.Path, benchmark: str, generator: dict[str, Any], files: dict[str, str]) -> None:
-    """Writes texts by the names of their files, and their manifest."""
-    content = {
+def write_benchmark(
+    folder: pathlib.Path, benchmark: str, generator: dict[str, Any], files: Mapping[str, str | bytes]
+) -> None:
+    """Writes texts and pictures by the names of their files, and their manifest."""
+    contents = {name: text if isinstance(text, bytes) else text.encode("ascii") for name, text in files.items()}
+    manifest = {
         "benchmark": benchmark,
         "version": TASK_VERSION,
         "generator": generator,
-        "files": {name: hashlib.sha256(text.encode("ascii")).hexdigest() for name, text in sorted(files.items())},
+        "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(contents.items())},
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in (files | {MANIFEST: json.dumps(content, indent=1) + "\n"}).items():
-        folder.joinpath(name).write_bytes(text.encode("ascii"))
+    for name, content in (contents | {MANIFEST: (json.dumps(manifest, indent=1) + "\n").encode("ascii")}).items():
+        folder.joinpath(name).parent.mkdir(parents=True, exist_ok=True)
+        folder.joinpath(name).write_bytes(content)
 
 
 if __name__ == "__main__":

@@ -37,7 +37,8 @@ def evaluate(
             "at all levels; tracks-dev, in the mazes to choose agents by; tracks-no-map, with the map hidden; "
             "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
             "tracks-camera and tracks-camera-dev, by camera alone; tracks-goals and tracks-goals-dev, three goals in "
-            "a row where doors have moved; llm and llm-dev, a few episodes, for agents whose answers cost."
+            "a row where doors have moved; real and real-dev, real buildings with right, changed, old and no maps; "
+            "llm and llm-dev, a few episodes, for agents whose answers cost."
         ),
     ] = None,
     out: Annotated[
@@ -64,6 +65,7 @@ def evaluate(
     from mazebench.commands.summary_table import print_suite, print_summary
     from mazebench.evaluation.evaluate import run_evaluation
     from mazebench.evaluation.suites import run_suite
+    from mazebench.results.reading import load_result, read_suite
 
     task = TaskOptions(**options_in(values, TaskOptions))
     options = EvalOptions(agent=agents[0], task=task, **options_in(values, EvalOptions))
@@ -92,7 +94,8 @@ def evaluate(
             if suite is None:
                 print_summary(summaries[0])
             else:
-                print_suite(summaries)
+                folders = [folder / read_suite(folder).folders[each.agent] / str(each.part) for each in summaries]
+                print_suite([load_result(each) for each in folders])
     except AgentError as error:
         if show_traceback and error.__cause__ is not None:
             traceback.print_exception(error.__cause__)

@@ -12,11 +12,14 @@ from rich.table import Table
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import one_line
+from mazebench.maps.real_buildings import SCAN
 from mazebench.results.comparison import Row
 from mazebench.results.metrics import HEADLINE, METRICS, Metric
 from mazebench.results.naming import noise_in_words, title_of
 from mazebench.results.paper import printed_mmn
+from mazebench.results.reading import Result
 from mazebench.results.records import Figures, Summary
+from mazebench.results.suite_groups import compare_maps, summarize_groups
 
 _ANY_WIDTH = 10_000  # characters
 _MOST_DISTANCES = 20  # of a table; --distances may name hundreds
@@ -56,14 +59,29 @@ def print_summary(summary: Summary) -> None:
         print("paper: success rate of the paper's MMN, in DeepMind Lab")
 
 
-def print_suite(summaries: Sequence[Summary]) -> None:
-    """Prints the overall figures of a suite's parts, one table an agent."""
-    for agent in dict.fromkeys(summary.who for summary in summaries):
-        own = [summary for summary in summaries if summary.who == agent]
-        columns = _columns(*own)
-        rows = [[str(summary.part), *_cells(summary.overall, columns)] for summary in own]
-        print_table(f"{agent}: suite {summaries[0].suite}", ["part", "n", *_heads(columns)], rows)
-    _print_notes(*summaries)
+def print_suite(results: Sequence[Result]) -> None:
+    """Prints the overall figures of a suite's parts or groups of them, one table an agent, and the worth of maps."""
+    for agent in dict.fromkeys(result.summary.agent for result in results):
+        own = [result for result in results if result.summary.agent == agent]
+        summaries = summarize_groups(own)
+        columns = _columns(*summaries)
+        rows = [
+            [name, *_cells(figures, columns)]
+            for summary in summaries
+            for name, figures in [(str(summary.part), summary.overall), *_scans(summary)]
+        ]
+        title = f"{summaries[0].who}: suite {summaries[0].suite}"
+        print_table(title, ["part", "n", *_heads(columns)], rows)
+        if worth := compare_maps(own):
+            print_comparison(f"{title}, A - B in the same episodes", "A - B", worth)
+    _print_notes(*(result.summary for result in results))
+
+
+def _scans(summary: Summary) -> list[tuple[str, Figures]]:
+    """Returns the row of the buildings that robots scanned, where a group of parts has others, too."""
+    figures = summary.by_fact.get(SCAN)
+    is_part = figures is not None and figures.n < summary.overall.n
+    return [(f"{summary.part}, scans", figures)] if is_part else []
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:

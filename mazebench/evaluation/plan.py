@@ -18,6 +18,7 @@ from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
+from mazebench.maps.real_buildings import is_real
 from mazebench.options import override
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
@@ -187,16 +188,16 @@ def make_plan(
         with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
             build_agent(options, task, agent_class)
     if trials is None:
-        per_maze = options.episodes_per_maze or FROZEN_PER_MAZE
-        trials = select_trials(task, options.episodes_per_distance, options.seed, per_maze)
+        trials = select_trials(task, options.episodes_per_distance, options.seed, options.episodes_per_maze)
     origin = provenance(options, task, agent_class)
     world = largest_spec(task.mazes[0], task.body)  # the hash of the mazes tells the walls, too
-    is_part = options.episodes_per_maze not in (None, FROZEN_PER_MAZE)
+    all_of_maze = None if task.options.is_frozen_building else FROZEN_PER_MAZE
+    is_part = options.episodes_per_maze not in (None, all_of_maze)
     identity = {
         "agent": options.agent,
         **task.options.to_json(),
-        "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart, as it does older maps
-        **({} if task.options.shown is None else {"shown": "own"}),
+        "mazes": _own_or_real(task.options.mazes),  # the hash tells those of one's own apart, as it does older maps
+        **({} if task.options.shown is None else {"shown": _own_or_real(task.options.shown)}),
         "episodes_per_distance": options.episodes_per_distance,
         **({"episodes_per_maze": options.episodes_per_maze} if is_part else {}),
         **({} if config is None else {"config": config.identity()}),
@@ -208,6 +209,13 @@ def make_plan(
     if options.checkpoint is not None:  # agents may change the working folder
         options = dataclasses.replace(options, checkpoint=str(pathlib.Path(options.checkpoint).absolute()))
     return Plan(options, task, agent_class, trials, identity, provenance=origin)
+
+
+def _own_or_real(mazes: Any) -> str | None:
+    """Returns the name of a real building; "own" for other mazes or older maps, None for the benchmark's."""
+    if mazes is None:
+        return None
+    return mazes if is_real(mazes) else "own"
 
 
 def _square(side: int) -> str:

@@ -18,8 +18,10 @@ from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.evaluation.pool import Pool
 from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import DEV, SIZES, manifest_hash
+from mazebench.maps.real_buildings import PREFIX, RIGHT, Building, buildings, is_real
 from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
 from mazebench.results.records import Summary
+from mazebench.results.suite_groups import OF, WITH_RIGHT_MAP, WITHOUT_MAP, group_of
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT
@@ -34,7 +36,7 @@ _CAMERA: dict[str, Any] = {"sensors": ("egocentric",), "camera_size": 64, "camer
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Part:
-    """One evaluation of a suite."""
+    """One evaluation of a suite. Parts named `GROUP--BUILDING` are summed up by group."""
 
     name: str
     task: TaskOptions
@@ -68,6 +70,33 @@ def _each_level(
     )
 
 
+def _in_real_buildings(split: str) -> tuple[Part, ...]:
+    """Returns a part for each frozen real building and map that is shown of it; the settings follow each other.
+
+    A building is played with the right map, with the older one where it has one, and with the map hidden, in the same
+    episodes; and with the right map and the pose of `adrift` 2, where it has no older map.
+    """
+    parts: dict[str, list[Part]] = {}
+
+    def add(group: str, building: Building, task: str = BUILDING, level: int = 1, **options: Any) -> None:
+        asked = TaskOptions(task=task, level=(level,), mazes=f"{PREFIX}{building.name}", **options)
+        parts.setdefault(group, []).append(Part(f"{group}{OF}{building.name}", asked))
+
+    for building in buildings().values():
+        if building.split != split:
+            continue
+        setting = building.setting
+        if setting == RIGHT:
+            add(setting, building)
+            add(f"{setting}{WITHOUT_MAP}", building, hide=("map",))
+            add("lost", building, ADRIFT, 2, shown=f"{PREFIX}{building.name}")
+        else:
+            add(setting, building, shown=f"{PREFIX}{building.older}")
+            add(f"{setting}{WITH_RIGHT_MAP}", building)
+            add(f"{setting}{WITHOUT_MAP}", building, hide=("map",))
+    return tuple(part for group in parts.values() for part in group)
+
+
 # A map flipped with probability 0 is hierarchical-13-k5; no warp and no noise are local-13: they are not run again.
 SUITES: dict[str, tuple[Part, ...]] = {
     "paper": (
@@ -97,6 +126,9 @@ SUITES: dict[str, tuple[Part, ...]] = {
     # Goals in a row on one wrong map; parts have names of their own, since their first goals are played on the tracks.
     "tracks-goals": _each_level((REBUILT,), "-goals", num_goals=3),
     "tracks-goals-dev": _each_level((REBUILT,), "-goals", num_goals=3, split=DEV),
+    # Frozen real buildings: what old maps and right maps are worth there.
+    "real": _in_real_buildings("eval"),
+    "real-dev": _in_real_buildings(DEV),
     "llm": _in_words(),
     "llm-dev": _in_words(split=DEV),
 }
@@ -138,8 +170,10 @@ def run_suite(
     out = out.absolute()  # agents may change the working folder
     if (checkpoint is not None or overrides) and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint or --set, found {len(agents)}")
-    plans = {
-        (folder, part.name): make_plan(
+    parts = {part.name: part for part in SUITES[suite]}
+
+    def planned(agent: str, part: Part) -> Plan:
+        plan = make_plan(
             EvalOptions(
                 agent=agent,
                 task=part.task,
@@ -150,37 +184,48 @@ def run_suite(
                 overrides=overrides or {},
             )
         )
-        for agent, folder in _folders(agents).items()
-        for part in SUITES[suite]
-    }
-    for plan in plans.values():
         plan.check_workers(run.workers)
-    plans = _playable(plans, out, suite)
+        return plan
+
+    # Plans in real buildings are made when they are played, but for the first of a group, which stands for the others.
+    agent_of = {folder: agent for agent, folder in _folders(agents).items()}
+    firsts = {name: next(each for each in parts if group_of(each) == group_of(name)) for name in parts}
+    plans = {
+        (folder, name): planned(agent, part)
+        for folder, agent in agent_of.items()
+        for name, part in parts.items()
+        if firsts[name] == name or not is_real(part.task.mazes)
+    }
+    left_out = _unplayable(plans, out, suite)
+    chosen = [(folder, name) for folder in agent_of for name in parts if (folder, firsts[name]) not in left_out]
+    chosen = [key for key in chosen if key not in left_out]
     with Pool(run.workers) as pool:
         make_folder(out)
-        _prepare(out, suite, agents, seed, plans, run.resume)
-        total = sum(len(plan.trials) for plan in plans.values())
-        summaries, before = [], 0
-        for (folder, part), plan in plans.items():
-            record = not is_finished(out / folder / part) if run.record is None else run.record
+        _prepare(out, suite, agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume)
+        counts = {key: len(plans.get(key, plans[key[0], firsts[key[1]]]).trials) for key in chosen}
+        summaries, before, total = [], 0, sum(counts.values())
+        for folder, name in chosen:
+            plan = plans.pop((folder, name), None) or planned(agent_of[folder], parts[name])
+            record = not is_finished(out / folder / name) if run.record is None else run.record
             summary = run_plan(
                 plan,
-                out / folder / part,
+                out / folder / name,
                 pool,
                 dataclasses.replace(run, resume=True, record=record),
                 lambda ended, of, before=before: progress(before + ended, total),  # type: ignore[misc]
                 suite=suite,
-                part=part,
+                part=name,
             )
             summaries.append(summary)
-            before += len(plan.trials)
+            before += counts[folder, name]
     return summaries
 
 
-def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> dict[tuple[str, str], Plan]:
-    """Returns the plans that their agents can play, and warns of the others in a line an agent."""
+def _unplayable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> set[tuple[str, str]]:
+    """Returns the folders and parts of the plans that their agents can't play, and warns of them in a line an agent."""
     refusals: dict[tuple[str, Interface], str | None] = {}  # an agent is built once for equal environments
-    left_out: dict[str, dict[str, str]] = {}  # reasons by folder and part
+    left_out: dict[str, dict[str, str]] = {}  # reasons by folder and group of parts
+    unplayable: set[tuple[str, str]] = set()
     for (folder, part), plan in plans.items():
         if is_finished(out / folder / part):
             continue
@@ -194,13 +239,14 @@ def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str)
             except (InputError, RunError):  # which it raises again when its turn comes
                 pass
         if (reason := refusals[key]) is not None:
-            left_out.setdefault(folder, {})[part] = reason
+            left_out.setdefault(folder, {})[group_of(part)] = reason
+            unplayable.add((folder, part))
     for folder, reasons in left_out.items():
         reason = next(iter(reasons.values()))
-        if len(reasons) == sum(each == folder for each, _ in plans):
+        if all(key in unplayable for key in plans if key[0] == folder):
             raise UnplayableError(f"{reason}; it can play no part of the suite {suite!r}")
         remark(f"{reason}; left out: {', '.join(reasons)}")
-    return {(folder, part): plan for (folder, part), plan in plans.items() if part not in left_out.get(folder, {})}
+    return unplayable
 
 
 def _prepare(

@@ -1,7 +1,8 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
-There are three: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
-train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`.
+There are four: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
+train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`. `real` has real buildings, which
+`mazebench.maps.real_buildings` reads.
 """
 
 from __future__ import annotations
@@ -18,8 +19,13 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
-PAPER_BENCHMARK, TRACKS_BENCHMARK, GOALS_BENCHMARK = "paper", "tracks", "tracks-goals"
-FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks", GOALS_BENCHMARK: "tracks_goals"}  # of the assets
+PAPER_BENCHMARK, TRACKS_BENCHMARK, GOALS_BENCHMARK, REAL_BENCHMARK = "paper", "tracks", "tracks-goals", "real"
+FOLDERS = {  # of the assets
+    PAPER_BENCHMARK: "paper_mazes",
+    TRACKS_BENCHMARK: "tracks",
+    GOALS_BENCHMARK: "tracks_goals",
+    REAL_BENCHMARK: "real",
+}
 SIZES = BENCHMARK_SIZES
 KINDS_SIZE = 31
 SPLITS = ("train", "eval")
@@ -71,7 +77,12 @@ def _read_mazes(benchmark: str, group: int | str, split: str, kind: str) -> tupl
 
 
 def read_asset(name: str, benchmark: str = PAPER_BENCHMARK) -> str:
-    """Returns the text of a file of a benchmark.
+    """Returns the text of a file of a benchmark; see `read_asset_bytes`."""
+    return read_asset_bytes(name, benchmark).decode("ascii")
+
+
+def read_asset_bytes(name: str, benchmark: str) -> bytes:
+    """Returns the content of a file of a benchmark.
 
     Raises:
       InputError: if its SHA-256 differs from the manifest's. A changed benchmark must be a new version.
@@ -80,7 +91,7 @@ def read_asset(name: str, benchmark: str = PAPER_BENCHMARK) -> str:
     expected, found = manifest(benchmark)["files"][name], hashlib.sha256(content).hexdigest()
     if found != expected:
         raise InputError(f"benchmark {benchmark}: {name} was changed: expected SHA-256 {expected}, found {found}")
-    return content.decode("ascii")
+    return content
 
 
 @functools.cache

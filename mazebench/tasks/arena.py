@@ -16,6 +16,7 @@ from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require
 from mazebench.maps.maze_options import THIN_WALLS
 from mazebench.maps.older_map import OlderMap
 from mazebench.maps.places import free_cell_of_place
+from mazebench.maps.real_buildings import is_real, load_building, load_older
 from mazebench.maps.selection import maps_in_texts
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
@@ -223,6 +224,9 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
     mazes, shown = asked.mazes, None
     if not isinstance(mazes, str):
         return mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes)
+    if is_real(mazes):
+        _check_maze(asked, maze := load_building(mazes))
+        return (maze,), None if asked.shown is None else (load_older(asked.shown, mazes),)
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
     if asked.shown is None:

@@ -18,11 +18,13 @@ from mazebench.maps.benchmark import (
     GOALS_BENCHMARK,
     KINDS_SIZE,
     PAPER_BENCHMARK,
+    REAL_BENCHMARK,
     TRACKS_BENCHMARK,
 )
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.places import place_text
+from mazebench.maps.real_buildings import is_real, split_of
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes, texts_of
 from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
@@ -30,6 +32,7 @@ from mazebench.tasks.perturbations import OF_OPTION
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
 from mazebench.tasks.perturbations.odometry import OdometryNoise
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, LIDAR, NOISE_OF_SENSORS, SENSORS, AllSensorOptions
+from mazebench.tasks.streams import ADRIFT, BUILDING
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.bodies import BODIES, SLIDER
 from mazebench.world.looks import PICTURES
@@ -94,7 +97,7 @@ class TaskOptions(AllSensorOptions, ReadOptions):
     mazes: Annotated[
         Any,
         ReadBy(_as_mazes),
-        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them."),
+        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them. real:NAME is a real building."),
     ] = None
     shown: Annotated[
         Any,
@@ -230,6 +233,10 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
         if self.track is not None and not self.sensors:
             object.__setattr__(self, "sensors", (LIDAR,))
+        if is_real(self.mazes) and (split := split_of(self.mazes)) is not None:
+            if self.split not in (None, split):
+                raise InputError(f"mazes {self.mazes}: expected split {split!r}, found {self.split!r}")
+            object.__setattr__(self, "split", split)
         self._check()
 
     @classmethod
@@ -292,9 +299,16 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         return self.mazes is not None or self.num_ends > 0
 
     @property
+    def is_frozen_building(self) -> bool:
+        """True if the frozen episodes of a real building are played: with the right map, or with its own older one."""
+        is_right = self.track == BUILDING or (self.track == ADRIFT and self.shown is not None)
+        return is_right and is_real(self.mazes) and not self.num_ends
+
+    @property
     def split_in_results(self) -> str:
         """The split as records and summaries have it."""
-        return CUSTOM if self.has_own or self.is_drawn else self.split or "train"
+        is_custom = self.is_drawn or (self.has_own and not self.is_frozen_building)
+        return CUSTOM if is_custom else self.split or "train"
 
     @property
     def frozen_split(self) -> str | None:
@@ -306,6 +320,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         """The benchmark that the task belongs to."""
         if self.track is None:
             return PAPER_BENCHMARK
+        if self.is_frozen_building:
+            return REAL_BENCHMARK
         return TRACKS_BENCHMARK if self.num_goals == 1 else GOALS_BENCHMARK
 
     @property
@@ -358,6 +374,10 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         for name, found in options_in(self.changed(), ReadOptions).items():
             if self.mazes is None and (name, found) != ("cell_size", 1):
                 raise InputError(f"expected mazes of your own with {name}, found none")
+            if is_real(self.mazes) and name != "cell_size":
+                raise InputError(f"mazes {self.mazes}: expected no {name}, found {found}")
+        if self.shown is not None and is_real(self.mazes) != is_real(self.shown):
+            raise InputError(f"expected mazes and shown of one kind, found {self.mazes} and {self.shown}"[:200])
 
         # Episodes.
         if self.num_goals > 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
 import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,11 +17,13 @@ from mazebench.maps.benchmark import (
     KINDS_SIZE,
     MAZES_PER_SPLIT,
     PAPER_BENCHMARK,
+    REAL_BENCHMARK,
     SIZES,
     TRACKS_BENCHMARK,
     read_asset,
 )
 from mazebench.maps.maze import Cell, Maze
+from mazebench.maps.real_buildings import building_of
 from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.tasks.task_options import TaskOptions
@@ -83,6 +86,24 @@ def _frozen_rows(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split: 
     return list(csv.DictReader(read_asset(episodes_file(task, size, split), benchmark).splitlines()))
 
 
+def frozen_in_building(mazes: str) -> list[Trial]:
+    """Returns the frozen episodes in a real building, `real:NAME`, whose distances are in its cells."""
+    building = building_of(mazes)
+    rows = _rows_by_building(building.split).get(building.name, ())
+    return [_parse(row | {"maze": "0"}) for row in rows]
+
+
+@functools.cache
+def _rows_by_building(split: str) -> dict[str, list[dict[str, str]]]:
+    rows = csv.DictReader(read_asset(buildings_file(split), REAL_BENCHMARK).splitlines())
+    return {name: list(own) for name, own in itertools.groupby(rows, key=lambda row: row["maze"])}
+
+
+def buildings_file(split: str) -> str:
+    """Returns the name of the file with the frozen episodes in real buildings of one split, by building."""
+    return f"episodes-{split}.csv"
+
+
 class _FrozenTrials(Sequence[Trial]):
     """The trials of rows of frozen episodes, each of which is parsed when it is asked for."""
 
@@ -123,7 +144,7 @@ def select_trials(
     task: Task,
     episodes_per_distance: int | None = EPISODES_PER_DISTANCE,
     seed: int = 0,
-    episodes_per_maze: int = FROZEN_PER_MAZE,
+    episodes_per_maze: int | None = None,
 ) -> Sequence[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
@@ -134,7 +155,8 @@ def select_trials(
       task: the task; its distances are those of the pairs.
       episodes_per_distance: for each maze and distance; None for 48 in each maze, spread over the distances.
       seed: of what is drawn.
-      episodes_per_maze: of the frozen ones of a track, beginning in maze k with number k modulo 5.
+      episodes_per_maze: of the frozen ones of a track, beginning in maze k with number k modulo 5, or the first ones
+        of a real building; None for all.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
@@ -145,11 +167,15 @@ def select_trials(
     return chosen if task.body == SLIDER else [_for_other_body(task, trial) for trial in chosen]
 
 
-def _select_frozen(task: Task, wanted: int, episodes_per_maze: int) -> Sequence[Trial] | None:
+def _select_frozen(task: Task, wanted: int, episodes_per_maze: int | None) -> Sequence[Trial] | None:
     """Returns the frozen episodes to evaluate, `wanted` for each maze and distance; None where they don't go so far."""
     frozen_split = task.options.frozen_split
     if frozen_split is None:
         return None
+    if task.options.is_frozen_building:
+        trials = [trial for trial in frozen_in_building(task.options.mazes) if trial.distance in task.distances]
+        return [with_later_legs(task, trial) for trial in trials[:episodes_per_maze]]
+    episodes_per_maze = episodes_per_maze or FROZEN_PER_MAZE
     if task.options.track is not None:
         rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
         chosen = [
