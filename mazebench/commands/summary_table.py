@@ -80,8 +80,7 @@ def print_suite(results: Sequence[Result]) -> None:
 def _scans(summary: Summary) -> list[tuple[str, Figures]]:
     """Returns the row of the buildings that robots scanned, where a group of parts has others, too."""
     figures = summary.by_fact.get(SCAN)
-    is_part = figures is not None and figures.n < summary.overall.n
-    return [(f"{summary.part}, scans", figures)] if is_part else []
+    return [(f"{summary.part}, scans", figures)] if figures and figures.n < summary.overall.n else []
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:

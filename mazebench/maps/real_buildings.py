@@ -45,11 +45,6 @@ def buildings() -> dict[str, Building]:
     return {row["name"]: Building(**row) for row in rows}
 
 
-def settings() -> tuple[str, ...]:
-    """Returns the settings of the frozen buildings, in the order of tables."""
-    return tuple(dict.fromkeys(building.setting for building in buildings().values()))
-
-
 def is_real(mazes: object) -> bool:
     """Returns whether a value of the option `mazes` or `shown` names a frozen building, or all of a setting."""
     return isinstance(mazes, str) and mazes.startswith(PREFIX)
@@ -67,9 +62,9 @@ def building_of(mazes: str) -> Building:
     return buildings()[name]
 
 
-def split_of(mazes: str) -> str | None:
-    """Returns the split of the building that a value of the option `mazes` names; None if it names all of a setting."""
-    return None if mazes.removeprefix(PREFIX) in settings() else building_of(mazes).split
+def is_setting(mazes: str) -> bool:
+    """Returns whether a value of the option `mazes` names all buildings of a setting, as reports group them."""
+    return mazes.removeprefix(PREFIX) in {building.setting for building in buildings().values()}
 
 
 @functools.lru_cache(maxsize=16)
@@ -99,6 +94,6 @@ def load_older(shown: str, mazes: str) -> OlderMap:
 def _read_walls(name: str) -> np.ndarray:
     """Returns `[N, N]` bool of a picture with a pixel for each cell, where black is wall."""
     content = read_asset_bytes(f"{name}.png", REAL_BENCHMARK)
-    walls = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE) == 0
+    walls = np.asarray(cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE)) == 0
     walls.flags.writeable = False
     return walls

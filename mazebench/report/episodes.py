@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError, remark
+from mazebench.maps.real_buildings import PREFIX, is_real
 from mazebench.results.metrics import by_fact, scores
 from mazebench.results.naming import described, order, own_in_words, setting_of
 from mazebench.results.played import Shown, played_task, shown_of
@@ -93,9 +94,10 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     ]
 
     # Of each label and setting, the result with the most episodes stays, the first of equals.
-    kept: dict[tuple[str, TaskOptions], ReportedResult] = {}
+    kept: dict[tuple[str, TaskOptions, str], ReportedResult] = {}
     for result in sorted(results, key=lambda each: -len(each.episodes)):
-        other = kept.setdefault((result.label, result.setting), result)
+        building = str(result.summary.task.mazes) if is_real(result.setting.mazes) else ""
+        other = kept.setdefault((result.label, result.setting, building), result)
         if other is not result:
             remark(f"{result.folder}: {result.label}, {described(result.setting)} again, as in {other.folder}; skipped")
     return sorted((result for result in results if result in kept.values()), key=lambda result: order(result.setting))
@@ -148,8 +150,11 @@ def facts_of(episodes: pd.DataFrame) -> list[str]:
 
 
 def common_distances(episodes: pd.DataFrame) -> list[int]:
-    """Returns the distances from start to goal that every result has, in cells; none for the hierarchical task."""
-    if episodes.task.eq("hierarchical").any():
+    """Returns the distances from start to goal that every result has, in cells.
+
+    There are none in the hierarchical task and in real buildings, each of which has its own.
+    """
+    if episodes.task.eq("hierarchical").any() or any(is_real(setting.mazes) for setting in episodes.setting.unique()):
         return []
     num_results = episodes.groupby("distance").result.nunique()
     return num_results.index[num_results == episodes.result.nunique()].tolist()
@@ -192,7 +197,7 @@ def reported(result: Result) -> ReportedResult:
     facts = by_fact(records)
     episodes = episodes.assign(**scores(records), **facts)
     setting = setting_of(summary.task)
-    if setting.mazes is not None:  # by their names, wherever the files were
+    if setting.mazes is not None and not is_real(setting.mazes):  # by their names, wherever the files were
         shown = None if setting.shown is None else "an older map"
         setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())), shown=shown)
 
@@ -212,6 +217,8 @@ def reported(result: Result) -> ReportedResult:
 def _mazes_in_words(result: ReportedResult) -> str:
     """Returns the set of mazes, and what else a user chose; an empty text for the benchmark's eval mazes."""
     split, words = result.setting.split_in_results, own_in_words(result.setting)
+    if is_real(result.setting.mazes):
+        words = (f"real buildings ({result.setting.mazes.removeprefix(PREFIX)})", *words)
     if split == CUSTOM:
         names = sorted(result.episodes.maze.unique())
         words = (f"mazes {', '.join(names[:3])}" + (f" and {len(names) - 3} more" if len(names) > 3 else ""), *words)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mazebench.maps.real_buildings import PREFIX, building_of, is_real
 from mazebench.options import fields_of
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, NOISE_OF_SENSORS, SENSORS
 from mazebench.tasks.task_options import ENDS, TaskOptions
@@ -19,7 +20,11 @@ def setting_of(options: TaskOptions) -> TaskOptions:
     left = [*_OF_AGENTS, "distances", "time_limit"]
     left += [] if options.is_hierarchical else ["landmark_distance"]
     left += [] if options.mazes is None else ["split"]
-    bare = {name: fields_of(TaskOptions)[name].default for name in left}
+    bare: dict[str, Any] = {name: fields_of(TaskOptions)[name].default for name in left}
+    if options.is_frozen_building:  # all buildings of a setting
+        setting = PREFIX + building_of(options.mazes).setting
+        shown = {None: None, options.mazes: setting}.get(options.shown, f"{PREFIX}older")
+        bare |= {"mazes": setting, "shown": shown, "split": options.split, "size": None, "cell_size": None}
     noisy = tuple(NOISE_OF_SENSORS[name] for name in options.noise if name in NOISE_OF_SENSORS)
     return options.replace(**bare | {"sensors": noisy})
 
@@ -34,7 +39,9 @@ def described(options: TaskOptions) -> str:
     """Returns all that is played in words: "local, 13 × 13, custom mazes, cells of 0.5 m"."""
     parts = [options.task] if options.track is None else [options.task, f"level {_levels(options)}"]
     parts += [f"{options.num_goals} goals"] * (options.num_goals > 1)
-    parts.append(f"{options.size} × {options.size}")
+    parts += [f"{options.size} × {options.size}"] * (options.size is not None)
+    if is_real(options.mazes):
+        parts.append(f"real buildings ({options.mazes.removeprefix(PREFIX)})")
     if options.split_in_results != "eval":
         parts.append(f"{options.split_in_results} mazes")
     parts += own_in_words(options)
@@ -48,7 +55,7 @@ def own_in_words(options: TaskOptions) -> tuple[str, ...]:
     """Returns a user's choices besides the mazes: the body, the size of a cell, start and goal, noise on the senses."""
     body = () if options.body == SLIDER.name else (f"body {options.body}",)
     scale = () if options.cell_size in (None, 1) else (f"cells of {options.cell_size:g} m",)
-    shown = () if options.shown is None else ("an older map shown",)
+    shown = () if options.shown in (None, options.mazes) else ("an older map shown",)
     ends = (f"{name} {end}" for name in ENDS if (end := getattr(options, name)) is not None)
     return (*body, *scale, *shown, *ends, *noise_in_words(options))
 

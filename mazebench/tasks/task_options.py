@@ -24,7 +24,7 @@ from mazebench.maps.benchmark import (
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.places import place_text
-from mazebench.maps.real_buildings import is_real, split_of
+from mazebench.maps.real_buildings import building_of, is_real, is_setting
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes, texts_of
 from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
@@ -233,10 +233,12 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
         if self.track is not None and not self.sensors:
             object.__setattr__(self, "sensors", (LIDAR,))
-        if is_real(self.mazes) and (split := split_of(self.mazes)) is not None:
-            if self.split not in (None, split):
-                raise InputError(f"mazes {self.mazes}: expected split {split!r}, found {self.split!r}")
-            object.__setattr__(self, "split", split)
+        if is_real(self.mazes) and not is_setting(self.mazes):
+            building = building_of(self.mazes)
+            for name, of_building in (("split", building.split), ("cell_size", float(building.cell_size))):
+                if (found := getattr(self, name)) not in (None, of_building):
+                    raise InputError(f"mazes {self.mazes}: expected {name} {of_building}, found {found}")
+            object.__setattr__(self, "split", building.split)
         self._check()
 
     @classmethod

@@ -173,8 +173,8 @@ def _select_frozen(task: Task, wanted: int, episodes_per_maze: int | None) -> Se
     if frozen_split is None:
         return None
     if task.options.is_frozen_building:
-        trials = [trial for trial in frozen_in_building(task.options.mazes) if trial.distance in task.distances]
-        return [with_later_legs(task, trial) for trial in trials[:episodes_per_maze]]
+        own = [trial for trial in frozen_in_building(task.options.mazes) if trial.distance in task.distances]
+        return [with_later_legs(task, trial) for trial in own[:episodes_per_maze]]
     episodes_per_maze = episodes_per_maze or FROZEN_PER_MAZE
     if task.options.track is not None:
         rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
