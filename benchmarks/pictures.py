@@ -12,6 +12,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,11 +28,12 @@ from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.film import run_episode
 from mazebench.maps import colors
-from mazebench.maps.benchmark import load_kind_mazes, load_mazes
+from mazebench.maps.benchmark import FROZEN_SPLITS, load_kind_mazes, load_mazes
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells, path_through_walls
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
+from mazebench.maps.real_buildings import PREFIX, RIGHT, YEARS, buildings, load_building, load_older
 from mazebench.report.page import lay_on_first_pose
 from mazebench.report.write_report import write_report
 from mazebench.results.played import Shown, shown_of
@@ -259,19 +261,61 @@ def draw_changes() -> None:
     plan = mazebench.generate("hospital", 41, np.random.default_rng(7))
     options = {"task": "rebuilt", "level": 2, "distances": DISTANCE, "episodes_per_distance": 4}
     played = play(None, "navigator", mazes=plan, **options)
-    pixels, walls = 31 * PIXELS // plan.size, played.maze.walls
-    both = draw_grid(walls | plan.walls, pixels)
-    for changed, shade in ((walls & ~plan.walls, DRIVEN), (plan.walls & ~walls, "#2a9d3a")):
-        both[np.kron(changed, np.ones((pixels, pixels), dtype=bool))] = tuple(bytes.fromhex(shade[1:]))
+    changes = _draw_changes(played.maze.walls, plan.walls, 31 * PIXELS // plan.size)
     pictures = {
         "the plan, which the robot is shown": _shown_map(played.shown),
-        "what has changed: closed (red), opened (green)": both,
+        "what has changed: closed (red), opened (green)": changes,
         "the building, and the navigator's path": _maze_and_path(played),
     }
     figure = Figure(figsize=(9.6, 3.4), layout="constrained")
     for axes, (title, picture) in zip(figure.subplots(1, 3), pictures.items(), strict=True):
         _show(axes, picture, title)
     figure.savefig(FOLDER / "your-map.png", dpi=110, metadata={"Software": None})
+
+
+def draw_real_buildings() -> None:
+    """Draws all real buildings of each split, and what differs between the maps of those that are in two."""
+    for split in FROZEN_SPLITS:
+        chosen = [each for each in buildings().values() if each.split == split and each.setting == RIGHT]
+        panels = {}
+        for each in chosen:
+            maze = load_building(PREFIX + each.name)
+            panels[f"{each.name}\n{each.use}, {each.origin}, {maze.side:.0f} m"] = draw_grid(_cut(maze.walls)[0], 2)
+        _save_panels(panels, 5, f"real-{split}.png")
+    panels = {}
+    for each in buildings().values():
+        if each.setting == YEARS:
+            maze = load_building(PREFIX + each.name)
+            walls, older = _cut(maze.walls, load_older(PREFIX + each.older, PREFIX + each.name).walls)
+            panels[each.name.replace("-since-", "\nsince ")] = _draw_changes(walls, older, 2)
+    _save_panels(panels, 4, "real-years.png")
+
+
+def _save_panels(panels: Mapping[str, np.ndarray], columns: int, name: str) -> None:
+    """Saves pictures with their titles, in rows of some columns."""
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(9.6, 2.15 * rows * 5 / columns), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for own, (title, picture) in zip(axes, panels.items(), strict=False):
+        _show(own, picture, title, 7)
+    for own in axes[len(panels) :]:
+        own.set_axis_off()
+    figure.savefig(FOLDER / name, dpi=110, metadata={"Software": None})
+
+
+def _cut(*grids: np.ndarray) -> list[np.ndarray]:
+    """Returns grids `[N, N]` bool of walls without the rows and columns around that are wall in all of them."""
+    free = ~np.all(grids, axis=0)
+    rows, columns = (np.flatnonzero(free.any(axis=axis)) for axis in (1, 0))
+    return [grid[rows[0] - 1 : rows[-1] + 2, columns[0] - 1 : columns[-1] + 2] for grid in grids]
+
+
+def _draw_changes(walls: np.ndarray, older: np.ndarray, pixels: int) -> np.ndarray:
+    """Returns a picture of walls `[H, W]` bool: red where it is wall now, green where it is free now."""
+    both = draw_grid(walls | older, pixels)
+    for changed, shade in ((walls & ~older, DRIVEN), (older & ~walls, "#2a9d3a")):
+        both[np.kron(changed, np.ones((pixels, pixels), dtype=bool))] = tuple(bytes.fromhex(shade[1:]))
+    return both
 
 
 def draw_looks() -> None:
@@ -391,5 +435,5 @@ def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **lo
 
 if __name__ == "__main__":
     of_episodes = film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes
-    for draw in (*of_episodes, draw_looks, draw_shortest_paths, draw_explorer):
+    for draw in (*of_episodes, draw_real_buildings, draw_looks, draw_shortest_paths, draw_explorer):
         draw()

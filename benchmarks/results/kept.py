@@ -21,6 +21,7 @@ from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import ON_TIMES, scores
 from mazebench.results.naming import order
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_result
+from mazebench.results.suite_groups import group_of
 from mazebench.results.trajectories import TRAJECTORIES
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -35,6 +36,7 @@ RECALL = "recall"
 RECALL_AGENTS = ("navigator", "neural-planner")
 RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
 LLM_DEV = "llm-dev"  # the archive of the suite on `dev`, whose parts are named as those of `llm`
+REAL = "real"  # begins the names of archives of evaluations in real buildings; the group of a part is the setting
 TOLD = "navigator-told"  # played `rebuilt` only
 # The settings whose maps lie as the mazes do, with the same doors moved: those with a true pose and registration.
 _REGISTERED = {
@@ -51,6 +53,7 @@ _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in fol
 # Of records.
 _COLUMNS = [
     "episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked", "leg", "after_miss", "notes",
+    "path_length",
 ]  # fmt: skip
 # Archives of evaluations with switches of their own, in folders ROW/SETTING: the agent is called ARCHIVE/ROW.
 _SWITCHED = ("map-policy", "mmn-search")
@@ -95,11 +98,15 @@ class Kept:
         self.read.update(found.archive)
         return found
 
+    def find(self, agent: str, setting: str) -> pd.DataFrame | None:
+        """Returns what `of` does; None if there are no such episodes."""
+        return self.of(agent, setting) if (agent, setting) in self.episodes.index else None
+
     def on_tracks(self, agent: str) -> Iterator[tuple[str, int, pd.DataFrame]]:
         """Yields the tracks and levels on which an agent was evaluated, with its episodes there."""
         for track, level in itertools.product(TRACKS, LEVELS):
-            if (agent, f"{track}-{level}") in self.episodes.index:
-                yield track, level, self.of(agent, f"{track}-{level}")
+            if (own := self.find(agent, f"{track}-{level}")) is not None:
+                yield track, level, own
 
     def milestones(self, archive: str) -> pd.DataFrame:
         """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
@@ -155,6 +162,9 @@ def read_kept(folder: pathlib.Path) -> Kept:
             if archive == _RUNS:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))
+            if archive.startswith(REAL):
+                agent, setting = summary.agent + archive.removeprefix(REAL), group_of(setting)
+                lines["episode"] = lines.maze + lines.episode.astype(str)
             rates = lines.groupby("maze")[ON_TIME_125].mean()
             lines[WORST_TENTH] = lines[ON_TIME_125].where(lines.maze.isin(rates.nsmallest(-(-len(rates) // 10)).index))
             run = (summary.provenance.checkpoint_sha256 or "")[:8]

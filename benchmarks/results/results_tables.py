@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import csv
 import functools
 import itertools
 import os
@@ -31,18 +32,23 @@ from benchmarks.results.kept import (
     ceilings,
     estimate,
 )
-from mazebench.maps.benchmark import SIZES
+from mazebench.maps.benchmark import FROZEN_SPLITS, REAL_BENCHMARK, SIZES, read_asset
 from mazebench.maps.kinds import KNOWN, NOVEL
+from mazebench.maps.real_buildings import ORIGINS, SCAN, buildings
 from mazebench.report.table import to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.metrics import METRICS, ON_TIMES, RECALLS, SPL, SUCCESS_RATE
+from mazebench.results.suite_groups import WITH_RIGHT_MAP, WITHOUT_MAP
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
 PAGES = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
+    *(
+        f"docs/{name}.md"
+        for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm", "real", "datasheet")
+    ),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
     *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
 )
@@ -134,6 +140,25 @@ _EXPECTED_LOCAL = {
     "navigator": "`navigator`, classical",
     "oracle": "`oracle`, the ceiling",
 }
+# In real buildings: agents, and settings by what a table calls them.
+_IN_REAL_BUILDINGS = {
+    "oracle": "`oracle`, privileged",
+    "navigator": "`navigator`, classical",
+    "navigator-camera": "`navigator` by camera",
+    "neural-planner": "`neural-planner`, learned",
+    "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map",
+    "dagger:Student": "90-second imitation of the oracle, reads distances on the map",
+    "map-policy-camera": "`map-policy`, learned, by camera",
+    "random": "`random`",
+}
+_REAL_SETTINGS = {
+    "right": "right map",
+    "right-no-map": "no map",
+    "lost": "lost pose",
+    "changed-1": "changed 1",
+    "changed-2": "changed 2",
+    "years": "years",
+}
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
     "navigator": "`navigator`, classical",
@@ -178,7 +203,8 @@ def with_tables(page: str, text: str, kept: Kept) -> str:
         kept.read.clear()
         table = report_table(kept, *of_report) if name == PAPER else TABLES[name](kept)
         archives = ", ".join(f"`{name}`" for name in sorted(kept.read))
-        return f"{block[1]}{table}\n{_SOURCE}{archives} ([commands]({commands})).\n{block[3]}"
+        source = f"\n{_SOURCE}{archives} ([commands]({commands})).\n" if archives else ""
+        return f"{block[1]}{table}{source}{block[3]}"
 
     return _BLOCK.sub(make, text)
 
@@ -373,6 +399,69 @@ def tracks_blocked(kept: Kept) -> str:
     return format_table(["setting", open_path, METRICS[ON_TIME_125].title, blocked, METRICS[ON_TIME_125].title], rows)
 
 
+def real_on_time(kept: Kept, origins: Sequence[str]) -> str:
+    """Returns agents' on-time rates in real buildings of some origins, with the maps that a robot would have."""
+
+    def played(agent: str, setting: str) -> pd.DataFrame | None:
+        own = kept.find(agent, setting)
+        return None if own is None else own[own.kind.isin(origins)]
+
+    header = [f"{text} ({played('navigator', name).maze.nunique()})" for name, text in _REAL_SETTINGS.items()]
+    rows = []
+    for agent, text in _IN_REAL_BUILDINGS.items():
+        groups = [played(agent, setting) for setting in _REAL_SETTINGS]
+        cells = ["-" if own is None else _interval(ON_TIME_125, own) for own in groups]
+        rows += [[text, *cells]] * (set(cells) != {"-"})
+    return format_table(["agent", *header], rows)
+
+
+def real_maps(kept: Kept) -> str:
+    """Returns what maps are worth to the navigator in real buildings that have changed, in the same episodes."""
+    rows = []
+    for setting, words in _REAL_SETTINGS.items():
+        if kept.find("navigator", right := setting + WITH_RIGHT_MAP) is None:
+            continue
+        names = {"right": right, "old": setting, "none": setting + WITHOUT_MAP}
+        own = {name: kept.of("navigator", group) for name, group in names.items()}
+        rates = [_number(each[ON_TIME_125].mean()) for each in own.values()]
+        more = [own[name].path_length.mean() - own["right"].path_length.mean() for name in ("old", "none")]
+        costs = [_interval(ON_TIME_125, own[a], own[b]) for a, b in (("right", "old"), ("old", "none"))]
+        num_buildings = own["old"].maze.nunique()
+        rows.append([words, str(num_buildings), *rates, *costs, *(f"{metres:.1f}" for metres in more)])
+    header = ["setting", "buildings", "right map", "old map", "no map", "right - old", "old - none"]
+    return format_table([*header, "m more with the old map", "with none"], rows)
+
+
+def real_buildings(kept: Kept) -> str:
+    """Returns how many real buildings each setting has in each split, and how many of them robots scanned."""
+    rows = []
+    for setting in dict.fromkeys(each.setting for each in buildings().values()):
+        counts = [
+            [each for each in buildings().values() if (each.setting, each.split) == (setting, split)]
+            for split in FROZEN_SPLITS
+        ]
+        cells = [f"{len(own)} ({sum(each.origin == SCAN for each in own)})" for own in counts]
+        rows.append([f"`{setting}`", *cells, str(len({each.site for own in counts for each in own}))])
+    return format_table(["setting", *(f"{split} (scans)" for split in FROZEN_SPLITS), "sites"], rows)
+
+
+def real_sources(kept: Kept) -> str:
+    """Returns the repositories from which maps of real buildings come, with their licences and the maps."""
+    sources = pd.DataFrame(csv.DictReader(read_asset("sources.csv", REAL_BENCHMARK).splitlines()))
+    rows = [
+        [repository, ", ".join(sorted(set(own.licence))), ", ".join(own["name"])]
+        for repository, own in sources.groupby("repository")
+    ]
+    return format_table(["repository", "licence", "maps"], rows)
+
+
+def real_left_out(kept: Kept) -> str:
+    """Returns the maps of which no building was made, and the changes that a building can't carry, by reason."""
+    left_out = pd.DataFrame(csv.DictReader(read_asset("left_out.csv", REAL_BENCHMARK).splitlines()))
+    rows = [[reason, ", ".join(own["map"])] for reason, own in left_out.groupby("reason")]
+    return format_table(["reason", "maps"], rows)
+
+
 def expected_on_track(track: str, kept: Kept) -> str:
     """Returns each agent's on-time rate at the levels of a track with its interval, and its success rates."""
     rows = []
@@ -436,6 +525,12 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     ),
     "expected-hierarchical": expected_hierarchical,
     "tracks-memory": tracks_memory,
+    "real-scans": functools.partial(real_on_time, origins=(SCAN,)),
+    "real-all": functools.partial(real_on_time, origins=ORIGINS),
+    "real-maps": real_maps,
+    "real-buildings": real_buildings,
+    "real-sources": real_sources,
+    "real-left-out": real_left_out,
     "tracks-novel-kinds": lambda kept: by_track(
         {
             f"`{agent}`, {name} layouts": (agent, ON_TIME_125, kinds)
