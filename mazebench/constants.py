@@ -14,6 +14,8 @@ ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times t
 EPISODES_PER_DISTANCE = 5  # of an evaluation, in each maze
 FROZEN_PER_MAZE = 5  # episodes of a track
 
+SLIDER_RADIUS = 0.15  # m, of the body of the paper's protocol and of the tracks
+
 STATE_SIZE = 12  # numbers of a state, of any body
 X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in a state, see docs/task.md
 

@@ -194,16 +194,19 @@ class TestMaze:
             read_maze(path, cell_size=cell_size)
         assert read_maze(path, cell_size=float(nearest)).cell_size == float(nearest)
 
-    def test_rooms_that_are_lost_are_counted_and_what_to_try_is_said(self, tmp_path, remarks):
+    def test_a_door_that_no_cell_fits_into_is_opened_and_this_is_said(self, tmp_path, remarks):
         picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=10)
         picture[20:29, 40:50] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
         path = write_map(tmp_path, picture, resolution=0.05)
-        read_maze(path, cell_size=0.5)
-        lines = remarks()
-        assert "; 9 of 18 free cells (50 %) closed that can't be reached from the others; 5 x 9" in lines[0]
-        assert lines[1:] == ["map: if rooms are missing, try a smaller --cell-size"]
-        read_maze(path)
-        assert len(remarks()) == 1  # cells are laid so that the door stays open
+        assert len(read_maze(path, cell_size=0.5).free_cells) == 9 + 9 + 1
+        (line,) = remarks()
+        assert "; 1 cell opened where a body 0.3 m wide passes on the map; 5 x 9" in line
+
+    def test_rooms_that_are_lost_are_named_with_their_place_and_the_width_of_the_way(self, tmp_path, remarks):
+        picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=20)
+        picture[40:43, 80:100] = 254  # 0.15 m wide
+        read_maze(write_map(tmp_path, picture, resolution=0.05, origin=[5.0, 5.0, 0.0]))
+        assert remarks()[-1] == "map: not in the maze: 7.3 m2 at (11.5, 7.5) m, by a way 0.15 m wide"
 
     def test_walls_are_inflated_by_metres(self, tmp_path):
         picture = np.full((9, 9), 254, np.uint8)

@@ -49,6 +49,13 @@ class Area:
         return self.edge_share >= _GROUND_EDGE
 
 
+class Rim(NamedTuple):
+    """The edge of a picture that cells lie over at an angle: pixels as far from it as cells beside it are free."""
+
+    rows: np.ndarray  # [E] int, of the pixels on which the cells are laid; -1 where the edge is blocked
+    columns: np.ndarray  # [E] int
+
+
 class Enclosed(NamedTuple):
     """A free area with walls around it, and where it lies in a grid of cells."""
 
@@ -59,10 +66,11 @@ class Enclosed(NamedTuple):
     walls: np.ndarray  # [N, N] bool
 
 
-def lay_cells(blocked: np.ndarray, pixels: int) -> Cells:
+def lay_cells(blocked: np.ndarray, pixels: int, rim: Rim | None) -> Cells:
     """Returns cells of `pixels` x `pixels`, wall where one is blocked or beyond the end.
 
-    They begin at the upper left corner, or where clearly more free cells of the building are left.
+    They begin at the upper left corner, or where clearly more free cells of the building are left. `rim` is the edge of
+    the picture if that is not the edge of `blocked`.
     """
     # The pixels that are the upper left ones of squares in which none is blocked.
     square = np.ones((pixels, pixels), np.uint8)
@@ -72,13 +80,16 @@ def lay_cells(blocked: np.ndarray, pixels: int) -> Cells:
         Cells(free[down::pixels, right::pixels] == 0, pixels, down, right)
         for down, right in itertools.product(offsets, offsets)
     ]
-    kept = [_building(areas).num_cells if (areas := areas_of(cells, blocked)) else 0 for cells in laid]
+    kept = [_building(areas).num_cells if (areas := areas_of(cells, blocked, rim)) else 0 for cells in laid]
     best = int(np.argmax(kept))
     return laid[best if kept[best] > _WORTH_SHIFTING * kept[0] else 0]
 
 
-def areas_of(cells: Cells, blocked: np.ndarray) -> list[Area]:
-    """Returns the areas that may be the building, by falling size: the largest, and others of a fair share."""
+def areas_of(cells: Cells, blocked: np.ndarray, rim: Rim | None) -> list[Area]:
+    """Returns the areas that may be the building, by falling size: the largest, and others of a fair share.
+
+    The arguments are those of `lay_cells`.
+    """
     labels, _ = scipy.ndimage.label(~cells.walls)
     sizes = np.bincount(labels.ravel(), minlength=1)
     sizes[0] = 0
@@ -86,12 +97,17 @@ def areas_of(cells: Cells, blocked: np.ndarray) -> list[Area]:
         return []
     least = min(_WORTH_LISTING * sizes.sum(), sizes.max())
     numbers = [number for number in np.argsort(-sizes, kind="stable") if sizes[number] >= least]
-    edge = np.concatenate(
-        [
-            *_edges(labels, blocked, cells.pixels, cells.down, cells.right),
-            *_edges(labels.T, blocked.T, cells.pixels, cells.right, cells.down),
-        ]
-    )
+    if rim is None:
+        edge = np.concatenate(
+            [
+                *_edges(labels, blocked, cells.pixels, cells.down, cells.right),
+                *_edges(labels.T, blocked.T, cells.pixels, cells.right, cells.down),
+            ]
+        )
+    else:
+        rows, columns = (rim.rows - cells.down) // cells.pixels, (rim.columns - cells.right) // cells.pixels
+        is_laid = (rows >= 0) & (rows < len(labels)) & (columns >= 0) & (columns < labels.shape[1])
+        edge = np.where(is_laid, labels[rows * is_laid, columns * is_laid], 0)
     return [
         Area(labels == number, int(sizes[number]), float((edge == number).mean())) for number in numbers[:_MOST_LISTED]
     ]

@@ -8,22 +8,29 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 import scipy
 
+from mazebench.constants import SLIDER_RADIUS
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.areas import areas_of, choose, describe_areas, enclose, lay_cells
+from mazebench.maps.readers.areas import Area, Cells, Rim, areas_of, choose, describe_areas, enclose, lay_cells
+from mazebench.maps.readers.directions import turn_of_walls
+from mazebench.maps.readers.lost_regions import lost_regions, reach_from
+from mazebench.maps.readers.narrow_ways import WORTH_REACHING, nodes_of, open_ways
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
-_MANY_CLOSED = 0.05  # share of the free cells of which a user would miss rooms
+_TIE = 1e-6  # of a pixel or cell, by which a centre on an edge lies right of it or above
+_ROWS_AT_ONCE = 256
+_MANY_CLOSED = 0.05  # share of the body's positions of which a user would miss rooms
+_WORTH_NAMING, _MOST_NAMED = 2.0, 3  # m2 of positions in a region that is lost; such regions
 _MIN_INVERTED = 0.25  # share of wall from which one connected wall in free cells is taken for the free cells
 
 
@@ -49,13 +56,77 @@ class LocatedMaze(NamedTuple):
     origin: Pose = (0.0, 0.0, 0.0)  # of the maze's lower left corner in the map's frame
 
 
-def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> LocatedMaze:
+def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: tuple[int, int]) -> np.ndarray:
+    """Returns the states of cells that are laid over a map at any pose: `[R, C]` int8.
+
+    A cell has the pixels whose centre lies in it, and the one under its own centre. It is OCCUPIED if one of them is,
+    else UNKNOWN if one is or lies outside of the map, else FREE.
+
+    Args:
+      grid: the map.
+      origin: of the cells' lower left corner, in the frame of the map's own origin.
+      cell_size: in metres; it may be below the resolution.
+      shape: R and C.
+    """
+    states = np.pad(grid.states, 1, constant_values=UNKNOWN)
+    height, width = states.shape
+    corner = np.array([-1.0, -1.0]) * grid.resolution  # of the padded pixels, in the frame that is turned as the map is
+    cells_in_map = _moved(origin, grid.origin)
+    map_in_cells = _moved(grid.origin, origin)
+
+    # The pixel under the centre of each cell; some rows at a time, as there may be as many cells as pixels.
+    laid = np.empty(shape, dtype=np.int8)
+    right = (np.arange(shape[1]) + 0.5) * cell_size
+    for begin in range(0, shape[0], _ROWS_AT_ONCE):
+        rows = np.arange(begin, min(begin + _ROWS_AT_ONCE, shape[0]))
+        x, y = _transformed(cells_in_map, right, (shape[0] - rows[:, None] - 0.5) * cell_size)
+        columns = np.clip(np.floor((x - corner[0]) / grid.resolution + _TIE), 0, width - 1).astype(np.intp)
+        from_below = np.clip(np.floor((y - corner[1]) / grid.resolution + _TIE), 0, height - 1).astype(np.intp)
+        laid[rows] = states[height - 1 - from_below, columns]
+
+    # The cell of each pixel at the rim of its state; what is inside of an area lies with others of it.
+    for state in (UNKNOWN, OCCUPIED):
+        has_state = (states == state).astype(np.uint8)
+        rows, columns = np.nonzero(has_state & (cv2.erode(has_state, np.ones((3, 3)), borderValue=0) == 0))
+        x, y = _transformed(
+            map_in_cells,
+            corner[0] + (columns + 0.5) * grid.resolution,
+            corner[1] + (height - rows - 0.5) * grid.resolution,
+        )
+        to_right, up = (np.floor(along / cell_size + _TIE).astype(np.intp) for along in (x, y))
+        down = shape[0] - 1 - up
+        is_inside = (down >= 0) & (down < shape[0]) & (to_right >= 0) & (to_right < shape[1])
+        down, to_right = down[is_inside], to_right[is_inside]
+        laid[down, to_right] = np.where(laid[down, to_right] == OCCUPIED, OCCUPIED, state)
+    return laid
+
+
+def _moved(origin: Pose, into: Pose) -> Pose:
+    """Returns an origin in the frame of another origin."""
+    x, y, yaw = origin
+    cosine, sine = math.cos(into[2]), math.sin(into[2])
+    right, up = x - into[0], y - into[1]
+    return cosine * right + sine * up, cosine * up - sine * right, yaw - into[2]
+
+
+def _transformed(origin: Pose, right: Any, up: Any) -> tuple[Any, Any]:
+    """Returns points that are given from an origin in the frame of that origin; exactly so if it is not turned."""
+    x, y, yaw = origin
+    if not yaw:
+        return x + right, y + up
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return x + cosine * right - sine * up, y + sine * right + cosine * up
+
+
+def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: float = SLIDER_RADIUS) -> LocatedMaze:
     """Returns one connected free area of `grid` as a maze.
 
-    Rows and columns around the grid of which nothing is known are cut off. A cell is wall if one of its pixels is. The
-    area is the one that has the cell or point `options.area`. If none is given, it is the largest one, or the largest
-    enclosed one of a fair size if the largest is the ground around it. All others are closed. Wall is added where the
-    border is open, then on the right or at the bottom until the maze is square. A `Remark` says what was changed.
+    Rows and columns around the grid of which nothing is known are cut off. If pixels are finer than cells, cells lie
+    along the walls. A cell is wall if one of its pixels is. The area is the one that has the cell or point
+    `options.area`. If none is given, it is the largest one, or the largest enclosed one of a fair size if the largest
+    is the ground around it. Cells are opened where a body of `radius` m reaches more of the building on the pixels. All
+    other areas are closed. Wall is added where the border is open, then on the right or at the bottom until the maze is
+    square. A `Remark` says what was changed.
 
     Raises:
       InputError: if an option does not fit the grid.
@@ -66,15 +137,19 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
         if not grid.is_defined:
             _require_not_inverted(grid.states, name)
 
-    # Which pixels can't be driven on, and the cells made of them.
-    known = grid.states != UNKNOWN
-    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
-    top, left = (int(rows[0]), int(columns[0])) if len(rows) else (0, 0)
-    states = grid.states[top : rows[-1] + 1, left : columns[-1] + 1] if len(rows) else grid.states
-    blocked = blocked_pixels(states, options, grid.resolution)
+    # Which pixels can't be driven on, and the cells made of them, along the walls if these are slanted.
+    picture = _known_part(grid)
+    turn = 0.0
+    if not grid.is_cells and _fewest_pixels(grid.resolution) > 1:
+        turn = turn_of_walls(picture.states == FREE, picture.states == OCCUPIED, grid.resolution)
+    shape = "{1} x {0}".format(*grid.states.shape)
+    grid = _turned(picture, turn) if turn else grid
+    part = _known_part(grid)
+    blocked = blocked_pixels(part.states, options, grid.resolution)
     pixels = 1 if grid.is_cells else _cell_pixels(blocked, grid.resolution, options, name)
     cell_size = options.cell_size or round(pixels * grid.resolution, 9)
-    cells = lay_cells(blocked, pixels)
+    rim = _rim(picture, part, cell_size) if turn else None
+    cells = lay_cells(blocked, pixels, rim)
     if cells.walls.all():
         wall, unknown, free = (100 * (grid.states == state).mean() for state in (OCCUPIED, UNKNOWN, FREE))
         raise MazeError(
@@ -82,10 +157,22 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
             f"{unknown:.0f} % unknown, {free:.0f} % free{'; ' * bool(grid.shades)}{grid.shades}"
         )
 
-    # One area, closed all around.
-    areas = areas_of(cells, blocked)
+    # One area, with the ways that are too narrow for cells, closed all around.
+    areas = areas_of(cells, blocked, rim)
     enclosed = [enclose(area.cells, 0 if grid.is_cells else MIN_SIZE) for area in areas]
     number, is_found = choose(areas, enclosed, options.area, cell_size)
+    num_opened = 0
+    if pixels > 1:
+        cell_of = _cells_of_pixels(picture, part, cells)
+        clear = _clearance(blocked_pixels(picture.states, options, grid.resolution), grid.resolution) > radius
+        open_walls = _with_ways(cells, areas, number, clear, cell_of, grid.resolution)
+        num_opened = int((cells.walls & ~open_walls).sum())
+    if num_opened:
+        inside = areas[number].cells
+        cells = cells._replace(walls=open_walls)
+        areas = areas_of(cells, blocked, rim)
+        enclosed = [enclose(area.cells, MIN_SIZE) for area in areas]
+        number = next(index for index, area in enumerate(areas) if (area.cells & inside).any())
     row, column, height, width, walls = enclosed[number]
     size = len(walls)
     if size > MAX_SIZE:
@@ -94,6 +181,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     maze = Maze(walls, name, cell_size)
 
     # Where the maze lies, in pixels from the edges of the map.
+    top, left = _known_corner(grid)
     from_left, from_top = left + cells.right + column * pixels, top + cells.down + row * pixels
     from_below = len(grid.states) - from_top - size * pixels
     x, y, yaw = grid.origin
@@ -102,10 +190,13 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     origin = x + cosine * right - sine * up, y + sine * right + cosine * up, yaw
 
     # What a user should know.
-    changes = [*grid.changes, *["nothing on it is wall"] * (not (states == OCCUPIED).any())]
+    changes = [*grid.changes, *["nothing on it is wall"] * (not (picture.states == OCCUPIED).any())]
     if pixels > 1:
-        shape = "{1} x {0}".format(*grid.states.shape)
-        changes.append(f"{shape} pixels of {grid.resolution:g} m as cells of {cell_size:g} m")
+        along = f" that are turned by {math.degrees(turn):.1f} degrees, along the walls" if turn else ""
+        changes.append(f"{shape} pixels of {grid.resolution:g} m as cells of {cell_size:g} m{along}")
+    if num_opened:
+        count = f"{num_opened} cell{'s' * (num_opened > 1)}"
+        changes.append(f"{count} opened where a body {2 * radius:g} m wide passes on the map")
     if len(areas) > 1:
         changes.append(describe_areas(areas, enclosed, number, cell_size))
     if not is_found:
@@ -124,17 +215,158 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
         changes.append(f"its cell (r, c) is ({_shifted('r', from_top)}, {_shifted('c', from_left)}) in the maze")
     if changes or from_left or from_below:
         remark(f"{name}: {'; '.join([*changes, _describe_corner(origin)])}")
-    num_lost = num_closed - sum(area.num_cells for area in areas if area.is_ground and area is not areas[number])
-    if num_lost > _MANY_CLOSED * num_free:
-        advice = {
-            "a smaller --cell-size": pixels > _fewest_pixels(grid.resolution),
-            "a smaller --inflate": options.inflate > 0,
-            "--unknown free": options.unknown == "wall" and bool((states == UNKNOWN).any()),
-            "without text, furniture and door swings on the plan": options.pixel_size is not None,
-        }
-        if any(advice.values()):
-            remark(f"{name}: if rooms are missing, try {', or '.join(way for way, helps in advice.items() if helps)}")
+    if pixels > 1 and (line := _describe_lost(picture, cells, cell_of, areas, number, options, radius)):
+        remark(f"{name}: {line}")
     return LocatedMaze(maze, origin)
+
+
+def _known_corner(grid: OccupancyGrid) -> tuple[int, int]:
+    """Returns the first row and the first column of which something is known; 0 if nothing is."""
+    known = grid.states != UNKNOWN
+    return int(known.any(axis=1).argmax()), int(known.any(axis=0).argmax())
+
+
+def _known_part(grid: OccupancyGrid) -> OccupancyGrid:
+    """Returns a map without the rows and columns around it of which nothing is known; all of it if nothing is."""
+    known = grid.states != UNKNOWN
+    if not known.any():
+        return grid
+    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    states = grid.states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    right, up = columns[0] * grid.resolution, (len(grid.states) - 1 - rows[-1]) * grid.resolution
+    x, y = _transformed(grid.origin, right, up)
+    return dataclasses.replace(grid, states=states, origin=(float(x), float(y), grid.origin[2]))
+
+
+def _turned(grid: OccupancyGrid, turn: float) -> OccupancyGrid:
+    """Returns a map in pixels that are turned by `turn` rad, with unknown ones in the corners."""
+    height, width = np.array(grid.states.shape) * grid.resolution
+    x, y = _transformed((0.0, 0.0, -turn), np.array([0, width, 0, width]), np.array([0, 0, height, height]))
+    shape = math.ceil(np.ptp(y) / grid.resolution), math.ceil(np.ptp(x) / grid.resolution)
+    corner = _transformed((0.0, 0.0, turn), x.min(), y.min())
+    x, y = _transformed(grid.origin, *corner)
+    origin = float(x), float(y), grid.origin[2] + turn
+    return dataclasses.replace(grid, states=states_in_cells(grid, origin, grid.resolution, shape), origin=origin)
+
+
+def _rim(picture: OccupancyGrid, part: OccupancyGrid, cell_size: float) -> Rim | None:
+    """Returns the edge of a picture, in pixels of it that are turned; None if no pixel at the edge is free."""
+    height, width = picture.states.shape
+    inward = math.ceil(1.5 * cell_size / picture.resolution)
+    rows, columns = (
+        np.concatenate(parts)
+        for parts in (
+            (np.zeros(width), np.full(width, height - 1), np.arange(height), np.arange(height)),
+            (np.arange(width), np.arange(width), np.zeros(height), np.full(height, width - 1)),
+        )
+    )
+    is_free = picture.states[rows.astype(int), columns.astype(int)] == FREE
+    if not is_free.any():
+        return None
+    inner_rows = np.clip(rows, min(inward, height // 2), max(height - 1 - inward, height // 2))
+    inner_columns = np.clip(columns, min(inward, width // 2), max(width - 1 - inward, width // 2))
+    at = [each * picture.resolution for each in (inner_columns + 0.5, height - inner_rows - 0.5)]
+    x, y = _transformed(_moved(picture.origin, part.origin), *at)
+    from_top = len(part.states) - 1 - np.floor(y / part.resolution)
+    return Rim(
+        np.where(is_free, from_top, -1).astype(int), np.where(is_free, np.floor(x / part.resolution), -1).astype(int)
+    )
+
+
+def _cells_of_pixels(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells) -> np.ndarray:
+    """Returns the cell of each pixel of a picture as row * C + column, -1 where there is none: `[H, W]` int.
+
+    `part` is the map that the cells were laid on.
+    """
+    height, width = picture.states.shape
+    right, up = (
+        (np.arange(width) + 0.5) * part.resolution,
+        (height - np.arange(height)[:, None] - 0.5) * part.resolution,
+    )
+    x, y = _transformed(_moved(picture.origin, part.origin), right, up)
+    num_rows, num_columns = cells.walls.shape
+    from_top = len(part.states) - 1 - np.floor(y / part.resolution + _TIE).astype(np.int32)
+    columns = (np.floor(x / part.resolution + _TIE).astype(np.int32) - cells.right) // cells.pixels
+    rows = (from_top - cells.down) // cells.pixels
+    is_laid = (rows >= 0) & (rows < num_rows) & (columns >= 0) & (columns < num_columns)
+    return np.where(is_laid, rows * np.int32(num_columns) + columns, np.int32(-1))
+
+
+def _with_ways(
+    cells: Cells, areas: list[Area], number: int, clear: np.ndarray, cell_of: np.ndarray, resolution: float
+) -> np.ndarray:
+    """Returns walls of cells in which one of the areas is joined with what a body reaches from it.
+
+    `clear` is where its centre may be: `[H, W]` bool. The ground around a building is not joined with it.
+    """
+    area, beside = areas[number].cells, np.ones((3, 3))
+    near = cv2.dilate(area.astype(np.uint8), beside) > 0
+    if np.sum(clear & ~near.ravel()[cell_of]) * resolution**2 < WORTH_REACHING:
+        return cells.walls
+    ground = sum(
+        (other.cells for other in areas if other.is_ground and other is not areas[number]), np.zeros_like(area)
+    )
+    shut = cv2.dilate(ground.astype(np.uint8), beside) > 0
+    return open_ways(cells.walls, area, shut, nodes_of(clear, cell_of, area.shape, resolution))
+
+
+def _describe_lost(
+    picture: OccupancyGrid,
+    cells: Cells,
+    cell_of: np.ndarray,
+    areas: list[Area],
+    number: int,
+    options: ReadOptions,
+    radius: float,
+) -> str:
+    """Returns which free regions of a map are not in the maze, how wide the ways there are, and what helps, in words.
+
+    It is empty if nothing that counts is lost. The ground around a building is not meant.
+    """
+    area, beside = areas[number].cells, np.ones((3, 3))
+    ground = sum((other.cells for other in areas if other.is_ground), np.zeros_like(area)) & ~area
+    is_near = cv2.dilate((area | ground).astype(np.uint8), beside).ravel() > 0
+    kept = area.ravel()[cell_of] & (cell_of >= 0)
+    bare = dataclasses.replace(options, inflate=0.0)
+    clear = _clearance(blocked_pixels(picture.states, bare, picture.resolution), picture.resolution)
+    lost = lost_regions(clear, kept, is_near[cell_of], picture.resolution, radius, _WORTH_NAMING)
+    share = sum(region.area for region in lost) / (np.sum(clear > radius) * picture.resolution**2 + 1e-9)
+    if not (any(region.width for region in lost) or share > _MANY_CLOSED):
+        return ""
+
+    # Where they are.
+    named = []
+    for region in lost[:_MOST_NAMED]:
+        right = (region.column + 0.5) * picture.resolution
+        up = (len(clear) - region.row - 0.5) * picture.resolution
+        x, y = _transformed(picture.origin, right, up)
+        way = f"by a way {region.width:.2g} m wide" if region.width else "closed on all sides"
+        named.append(f"{region.area:,.3g} m2 at ({x:.1f}, {y:.1f}) m, {way}")
+    others = len(lost) - len(named)
+    line = f"not in the maze: {'; '.join(named)}{f'; and {others} more' * bool(others)}"
+
+    # What may help: by which the body would reach one of them.
+    places = np.array([region.row * clear.shape[1] + region.column for region in lost])
+    inside = np.flatnonzero(kept)
+    is_within_reach = np.array([region.width >= 2 * radius - _TIE for region in lost])
+    advice = {
+        "a smaller --cell-size": cells.pixels > _fewest_pixels(picture.resolution),
+        "a smaller --inflate": options.inflate > 0,
+    }
+    ways = [way for way, helps in advice.items() if helps and is_within_reach.any()]
+    if options.unknown == "wall" and not is_within_reach.all():
+        known = blocked_pixels(picture.states, dataclasses.replace(bare, unknown="free"), picture.resolution)
+        through = reach_from(inside, _clearance(known, picture.resolution) > radius, places)
+        ways += ["--unknown free"] * bool((through & ~is_within_reach).any())
+    if options.pixel_size is not None and not is_within_reach.all():
+        ways.append("without text, furniture and door swings on the plan")
+    return f"{line}; try {', or '.join(ways)}" if ways else line
+
+
+def _clearance(blocked: np.ndarray, resolution: float) -> np.ndarray:
+    """Returns the distance from the centre of each pixel to that of the nearest one that is blocked: `[H, W]`, in m."""
+    free = np.pad(~blocked, 1).astype(np.uint8)
+    return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] * resolution
 
 
 def _require_not_inverted(states: np.ndarray, name: str) -> None:

@@ -31,6 +31,7 @@ _MASK_NAME = re.compile(
 )  # of Nav2's filters
 _MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
+_SAVED_SHADES = 3  # the commonest ones of a map that map_saver wrote, also if it was retouched since
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
 _LEAST_INSIDE = 0.2  # share of a floor plan that is free inside of closed outer walls; less of it is a closed room
 _Share = Annotated[float, Interval(ge=0, le=1)]
@@ -168,8 +169,8 @@ def read_occupancy(path: pathlib.Path) -> OccupancyGrid:
     """Reads what map_server would publish of a map, with all that is between free and occupied as unknown.
 
     It departs from map_server in one case. In the mode trinary, map_saver writes the shade 205 for unknown, but many of
-    its versions write a `free_thresh` with which map_server takes 205 as free. In a picture of map_saver's shades
-    alone, 205 is therefore unknown whatever the threshold says.
+    its versions write a `free_thresh` with which map_server takes 205 as free. In a picture in which 205 is one of the
+    three commonest shades, it is therefore unknown whatever the threshold says.
 
     Raises:
       InputError: if one of the two files can't be read.
@@ -294,13 +295,12 @@ def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
 
 
 def _saved_as_unknown(picture: np.ndarray) -> np.ndarray:
-    """Returns `[H, W]` bool: the unknown pixels of a picture of map_saver's shades; none of any other picture."""
+    """Returns `[H, W]` bool: the pixels of the shade of unknown, if it is one of the commonest; else none."""
     colors = picture[..., :3] if picture.ndim == 3 else picture[..., None]
-    shades = colors[..., 0]
-    found = set(np.unique(colors).tolist())
-    needed = {_FREE_SHADE, _UNKNOWN_SHADE}
-    is_saved = needed <= found <= needed | {_OCCUPIED_SHADE} and (colors == shades[..., None]).all()
-    return (shades == _UNKNOWN_SHADE) & is_saved
+    is_unknown = np.all(colors == _UNKNOWN_SHADE, axis=-1)
+    is_gray = np.all(colors == colors[..., :1], axis=-1)
+    counts = np.sort(np.bincount(colors[..., 0][is_gray]))
+    return is_unknown & bool(is_unknown.sum() >= counts[-_SAVED_SHADES:].min(initial=1))
 
 
 def _state_of_shades(metadata: _Metadata) -> np.ndarray:

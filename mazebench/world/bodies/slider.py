@@ -5,11 +5,12 @@
 
 import math
 
+from mazebench.constants import SLIDER_RADIUS
 from mazebench.world.bodies.body import Body
 
 SLIDER = Body(
     name="slider",
-    radius=0.15,  # DeepMind Lab's box is 30 x 30 x 56 units
+    radius=SLIDER_RADIUS,  # DeepMind Lab's box is 30 x 30 x 56 units
     height=0.56,
     mass=1.0,
     yaw_inertia=0.02,
