@@ -8,6 +8,7 @@ import runpy
 import hypothesis
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import strategies
 from scipy import stats
 
@@ -100,13 +101,26 @@ class TestDifferences:
         # Five episodes a maze: each of the two counts for 1.4.
         assert difference_interval(np.zeros(100), MAZES).high == pytest.approx(1.4 * Z * np.sqrt(2) / 102.8)
 
-    def test_wins_and_losses_agree_with_bonett_and_price(self):
-        # p1 = 9 / 32 and p2 = 3 / 32 with the added pairs; p1 - p2 +- z sqrt((p1 + p2 - (p1 - p2)^2) / 32).
+    def test_wins_and_losses_agree_with_the_bootstrap_of_scipy(self):
         differences = np.array([1.0] * 8 + [-1.0] * 2 + [0.0] * 20)
-        half_width = Z * np.sqrt((12 / 32 - (6 / 32) ** 2) / 32)
+        expected = scipy.stats.bootstrap((differences,), np.mean, method="percentile", rng=np.random.default_rng(1))
+        wider = np.sqrt(30 / 29) * scipy.stats.t.ppf(0.975, 29) / Z
         found = difference_interval(differences, np.arange(30))
-        assert (found.value, found.low, found.high) == pytest.approx((0.2, 6 / 32 - half_width, 6 / 32 + half_width))
+        assert found.value == pytest.approx(0.2)
+        ends = [0.2 + wider * (end - 0.2) for end in expected.confidence_interval]
+        assert (found.low, found.high) == pytest.approx(ends, abs=0.04)  # a step is 1 / 30
         assert difference_interval(differences, np.zeros(30)) == found  # a single maze
+
+    def test_a_few_losses_in_many_ties_are_told_from_none(self):
+        # Six mazes of 48 with a loss each: no draw of mazes has a gain, and hardly one has no loss.
+        differences = np.zeros(240)
+        differences[:30:5] = -1
+        found = difference_interval(differences, np.repeat(np.arange(48), 5))
+        assert -0.05 < found.low < found.value < found.high < 0
+
+    def test_the_same_differences_give_the_same_interval(self):
+        differences = np.random.default_rng(0).choice([-1.0, 0.0, 1.0], 100)
+        assert difference_interval(differences, MAZES) == difference_interval(differences, MAZES)
 
     def test_mazes_that_decide_together_widen_the_interval(self):
         alone = np.tile([1.0, -1.0, 0.0, 0.0, 0.0], 20)

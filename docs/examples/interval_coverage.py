@@ -71,7 +71,8 @@ def print_row(*cells: object) -> None:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if sys.argv[1:] else 2_000
-    sizes = [(mazes, size, by) for mazes, size in ((48, 5), (20, 5), (20, 75)) for by in (0.0, 0.05, 0.2)]
+    designs = ((48, 5), (20, 5), (20, 75), (27, 12), (12, 12))
+    sizes = [(mazes, size, by) for mazes, size in designs for by in (0.0, 0.05, 0.2)]
     print_row("of", "mazes x episodes", "correlation", *RATES)
     for kind in ("success", "SPL", "difference"):
         for mazes, size, by in [*sizes, (20, 1, 0.0)]:
