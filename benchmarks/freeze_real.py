@@ -72,12 +72,14 @@ def freeze_real(maps: pathlib.Path, folder: pathlib.Path) -> None:
     used = {name for row in chosen if not row["reason"] for name in (row["map"], row["older"]) if name}
     sources = [row for row in read_index(maps) if row["name"] in used]
     faults: list[tuple[str, str]] = []
-    frozen = list(freeze_buildings(maps, chosen, faults))
+    frozen = []
+    for each in freeze_buildings(maps, chosen, faults):
+        frozen.append(each)
+        print(each.building.name, each.maze.size, flush=True)
 
     # What the files hold: the buildings and the older maps that no other building is, then episodes by split.
     files: dict[str, str | bytes] = {TABLE: _to_csv(Building._fields, [each.building for each in frozen])}
     for each in frozen:
-        print(each.building.name, each.maze.size, len(each.trials), flush=True)
         files[f"{each.building.name}.png"] = to_png(each.maze.walls)
         if each.older is not None:
             files.setdefault(f"{each.building.older}.png", to_png(each.older.walls))

@@ -20,8 +20,8 @@ from mazebench.maps.older_map import OlderMap
 PREFIX = "real:"
 TABLE = "buildings.csv"
 RIGHT, YEARS = "right", "years"
-# How a map came about: scanned by a robot in a building, drawn by people, or of a simulated world.
-ORIGINS = SCAN, PLAN, SIMULATION = "scan", "plan", "simulation"
+# How a map came about: scanned by a robot in a building, drawn by people, of a simulated world, or not known.
+ORIGINS = SCAN, PLAN, SIMULATION, UNCLEAR = "scan", "plan", "simulation", "unclear"
 
 
 class Building(NamedTuple):
