@@ -140,6 +140,16 @@ class TestMapSaver:
         assert remarks()[0].startswith("map: shade 205 read as unknown, as map_saver means it, though free_thresh 0.25")
 
 
+def test_the_shade_of_unknown_is_read_so_in_a_retouched_map_but_not_where_it_is_rare(tmp_path, remarks):
+    picture = drawn("???????? ??####?? ??#..#?? ??#..#?? ??####?? ????????", pixels=4)
+    picture[10, 10:13] = 255, 90, 128  # of an eraser and of soft lines
+    path = write_map(tmp_path, picture, free_thresh=0.25)
+    assert (read_occupancy(path).states == -1).sum() == (48 - 16) * 16 + 2
+    rare = np.full((20, 20), 254, dtype=np.uint8)
+    rare[0], rare[1], rare[2, :4] = 0, 255, 205
+    assert (read_occupancy(write_map(tmp_path, rare, free_thresh=0.25)).states == -1).sum() == 0
+
+
 SURROUNDED = "????????? ??#####?? ??#...#?? ??#.?.#?? ??#...#?? ??#####?? ?????????"
 
 

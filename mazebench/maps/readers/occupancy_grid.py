@@ -18,7 +18,18 @@ from mazebench.constants import SLIDER_RADIUS
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.areas import Area, Cells, Rim, areas_of, choose, describe_areas, enclose, lay_cells
+from mazebench.maps.places import cell_of_place
+from mazebench.maps.readers.areas import (
+    Area,
+    Cells,
+    Rim,
+    areas_of,
+    choose,
+    describe_areas,
+    enclose,
+    lay_cells,
+    outside_of,
+)
 from mazebench.maps.readers.directions import turn_of_walls
 from mazebench.maps.readers.lost_regions import lost_regions, reach_from
 from mazebench.maps.readers.narrow_ways import WORTH_REACHING, nodes_of, open_ways
@@ -161,18 +172,26 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     areas = areas_of(cells, blocked, rim)
     enclosed = [enclose(area.cells, 0 if grid.is_cells else MIN_SIZE) for area in areas]
     number, is_found = choose(areas, enclosed, options.area, cell_size)
-    num_opened = 0
+    num_opened, outside = 0, np.zeros_like(cells.walls)
     if pixels > 1:
         cell_of = _cells_of_pixels(picture, part, cells)
-        clear = _clearance(blocked_pixels(picture.states, options, grid.resolution), grid.resolution) > radius
-        open_walls = _with_ways(cells, areas, number, clear, cell_of, grid.resolution)
-        num_opened = int((cells.walls & ~open_walls).sum())
-    if num_opened:
-        inside = areas[number].cells
-        cells = cells._replace(walls=open_walls)
-        areas = areas_of(cells, blocked, rim)
-        enclosed = [enclose(area.cells, MIN_SIZE) for area in areas]
-        number = next(index for index, area in enumerate(areas) if (area.cells & inside).any())
+        clear = _clearance(picture, options)
+        walls, inside = _with_ways(cells, areas, number, clear > radius, cell_of, grid.resolution), areas[number].cells
+        num_opened = int((cells.walls & ~walls).sum())
+        if areas[number].is_ground:
+            shown = np.bincount(cell_of[cell_of >= 0], minlength=walls.size).reshape(walls.shape) > 0
+            outside = outside_of(~walls, ~shown, cell_size)
+            if options.area is not None and is_found:
+                asked = np.array(cell_of_place(options.area, len(enclosed[number].walls), cell_size))
+                asked += enclosed[number].row, enclosed[number].column
+                if not outside[tuple(asked)]:
+                    walls, inside = walls | outside, np.zeros_like(outside)
+                    inside[tuple(asked)] = True
+        if (walls != cells.walls).any():
+            cells = cells._replace(walls=walls)
+            areas = areas_of(cells, blocked, rim)
+            enclosed = [enclose(area.cells, MIN_SIZE) for area in areas]
+            number = next(index for index, area in enumerate(areas) if (area.cells & inside).any())
     row, column, height, width, walls = enclosed[number]
     size = len(walls)
     if size > MAX_SIZE:
@@ -206,6 +225,13 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     if num_closed:
         share = f"{num_closed:,} of {num_free:,} free cells ({100 * num_closed / num_free:.0f} %)"
         changes.append(f"{share} closed that can't be reached from the others")
+    num_outside, building = int((outside & areas[number].cells).sum()), _largest(areas[number].cells & ~outside)
+    if min(num_outside, building.sum()) > _MANY_CLOSED * areas[number].num_cells:
+        place = np.argwhere(building)[0] - (row, column)
+        changes.append(
+            f"{100 * num_outside / areas[number].num_cells:.0f} % of the maze lies outside of the walls, "
+            f"--area {place[0]},{place[1]} leaves it out"
+        )
     beyond = np.array([from_top + (height - 1) * pixels, from_left + (width - 1) * pixels]) - grid.states.shape
     if min(from_top, from_left) < 0 or max(beyond) >= 0:
         changes.append("wall added along its border")
@@ -215,7 +241,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
         changes.append(f"its cell (r, c) is ({_shifted('r', from_top)}, {_shifted('c', from_left)}) in the maze")
     if changes or from_left or from_below:
         remark(f"{name}: {'; '.join([*changes, _describe_corner(origin)])}")
-    if pixels > 1 and (line := _describe_lost(picture, cells, cell_of, areas, number, options, radius)):
+    if pixels > 1 and (line := _describe_lost(picture, clear, cells, cell_of, areas, number, options, radius)):
         remark(f"{name}: {line}")
     return LocatedMaze(maze, origin)
 
@@ -273,6 +299,12 @@ def _rim(picture: OccupancyGrid, part: OccupancyGrid, cell_size: float) -> Rim |
     )
 
 
+def _largest(cells: np.ndarray) -> np.ndarray:
+    """Returns the largest connected part of some cells: `[R, C]` bool; none if there are none."""
+    parts, _ = scipy.ndimage.label(cells)
+    return cells & (parts == np.bincount(parts[cells], minlength=1).argmax())
+
+
 def _cells_of_pixels(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells) -> np.ndarray:
     """Returns the cell of each pixel of a picture as row * C + column, -1 where there is none: `[H, W]` int.
 
@@ -312,6 +344,7 @@ def _with_ways(
 
 def _describe_lost(
     picture: OccupancyGrid,
+    clear: np.ndarray,
     cells: Cells,
     cell_of: np.ndarray,
     areas: list[Area],
@@ -328,7 +361,7 @@ def _describe_lost(
     is_near = cv2.dilate((area | ground).astype(np.uint8), beside).ravel() > 0
     kept = area.ravel()[cell_of] & (cell_of >= 0)
     bare = dataclasses.replace(options, inflate=0.0)
-    clear = _clearance(blocked_pixels(picture.states, bare, picture.resolution), picture.resolution)
+    clear = _clearance(picture, bare) if options.inflate else clear
     lost = lost_regions(clear, kept, is_near[cell_of], picture.resolution, radius, _WORTH_NAMING)
     share = sum(region.area for region in lost) / (np.sum(clear > radius) * picture.resolution**2 + 1e-9)
     if not (any(region.width for region in lost) or share > _MANY_CLOSED):
@@ -355,18 +388,17 @@ def _describe_lost(
     }
     ways = [way for way, helps in advice.items() if helps and is_within_reach.any()]
     if options.unknown == "wall" and not is_within_reach.all():
-        known = blocked_pixels(picture.states, dataclasses.replace(bare, unknown="free"), picture.resolution)
-        through = reach_from(inside, _clearance(known, picture.resolution) > radius, places)
+        through = reach_from(inside, _clearance(picture, dataclasses.replace(bare, unknown="free")) > radius, places)
         ways += ["--unknown free"] * bool((through & ~is_within_reach).any())
     if options.pixel_size is not None and not is_within_reach.all():
         ways.append("without text, furniture and door swings on the plan")
     return f"{line}; try {', or '.join(ways)}" if ways else line
 
 
-def _clearance(blocked: np.ndarray, resolution: float) -> np.ndarray:
-    """Returns the distance from the centre of each pixel to that of the nearest one that is blocked: `[H, W]`, in m."""
-    free = np.pad(~blocked, 1).astype(np.uint8)
-    return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] * resolution
+def _clearance(picture: OccupancyGrid, options: ReadOptions) -> np.ndarray:
+    """Returns the distance from the centre of each pixel to that of the nearest blocked one: `[H, W]`, in m."""
+    free = np.pad(~blocked_pixels(picture.states, options, picture.resolution), 1).astype(np.uint8)
+    return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] * picture.resolution
 
 
 def _require_not_inverted(states: np.ndarray, name: str) -> None:
