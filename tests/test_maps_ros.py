@@ -205,12 +205,12 @@ class TestMaze:
         assert read_maze(path, cell_size=float(nearest)).cell_size == float(nearest)
 
     def test_a_door_that_no_cell_fits_into_is_opened_and_this_is_said(self, tmp_path, remarks):
-        picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=10)
-        picture[20:29, 40:50] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
+        picture = drawn("########### #....#....# #....#....# #....#....# #....#....# ###########", pixels=10)
+        picture[20:29, 50:60] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
         path = write_map(tmp_path, picture, resolution=0.05)
-        assert len(read_maze(path, cell_size=0.5).free_cells) == 9 + 9 + 1
+        assert len(read_maze(path, cell_size=0.5).free_cells) == 16 + 16 + 1
         (line,) = remarks()
-        assert "; 1 cell opened where a body 0.3 m wide passes on the map; 5 x 9" in line
+        assert "; 1 cell opened where a body 0.3 m wide passes on the map; 6 x 11" in line
 
     def test_rooms_that_are_lost_are_named_with_their_place_and_the_width_of_the_way(self, tmp_path, remarks):
         picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=20)

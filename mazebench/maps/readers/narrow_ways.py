@@ -107,8 +107,9 @@ def _pairs(pixels: np.ndarray, axis: int, number: int) -> np.ndarray:
 def open_ways(walls: np.ndarray, area: np.ndarray, shut: np.ndarray, nodes: Nodes, least: float) -> np.ndarray:
     """Returns walls in which an area is joined with the regions that the body reaches from it: `[R, C]` bool.
 
-    If one of them has at least `least` m2, ways to all from `WORTH_REACHING` are opened. The cells that are opened are the fewest along a way of the body, and each
-    has a position on that way. None is opened that would join cells beside it between which the body can't move there.
+    If one of them has at least `least` m2, ways to all from `WORTH_REACHING` are opened. The cells that are opened are
+    the fewest along a way of the body, and each has a position on that way. None is opened that would join cells beside
+    it between which the body can't move there.
 
     Args:
       walls: `[R, C]` bool.

@@ -225,7 +225,8 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     # What a user should know.
     if pixels > 1:
         along = f" that are turned by {math.degrees(turn):.1f} degrees, along the walls" if turn else ""
-        coarser = f"{all_states.shape[1]} x {all_states.shape[0]} pixels of {grid.resolution:g} m as cells of {cell_size:g} m{along}"
+        shape = "{1} x {0}".format(*all_states.shape)
+        coarser = f"{shape} pixels of {grid.resolution:g} m as cells of {cell_size:g} m{along}"
         changes = [coarser, *changes]
     changes = [*grid.changes, *["nothing on it is wall"] * (not (picture.states == OCCUPIED).any()), *changes]
     if len(areas) > 1:
