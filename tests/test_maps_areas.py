@@ -61,6 +61,20 @@ class TestArea:
         with pytest.raises(InputError, match=r"expected area as a cell 'row,column' or a point .*, found 'here'"):
             locate_maze(grid_of(TWO_WINGS), ReadOptions(area="here"), "map")
 
+    def test_ground_outside_of_an_open_door_is_said_and_a_place_inside_cuts_it_off(self, remarks):
+        states = np.full((300, 400), FREE, dtype=np.int8)
+        states[100:200, 100:300] = OCCUPIED
+        states[104:196, 104:296] = FREE
+        states[196:200, 200:220] = FREE  # a door of 1 m
+        grid = OccupancyGrid(states, 0.05)
+        maze, _ = locate_maze(grid, ReadOptions(), "map")
+        assert len(maze.free_cells) > 37 * 50 - 13 * 26
+        (line,) = remarks()
+        inside, said = line.split(" leaves it out")[0].split("--area ")[1], "85 % of the maze lies outside of the walls"
+        assert said in line
+        maze, _ = locate_maze(grid, ReadOptions(area=inside), "map")
+        assert 11 * 23 <= len(maze.free_cells) <= 12 * 24
+
 
 class TestCells:
     def test_they_begin_where_they_keep_the_most_floor(self):

@@ -207,8 +207,8 @@ def of_size(width: int, height: int) -> bytes:
         (b"#####\n", "a picture, found a file of another kind"),
         (b"\x89PNG\r\n\x1a\n", "a picture, found a picture that is damaged$"),
         (b"%PDF-1.7\n", "a picture, found a PDF; export it as PNG"),
-        (of_size(30000, 30000), "at most 67108864 pixels, found many more$"),
-        (of_size(10000, 10000), "at most 67108864 pixels, found 10000 x 10000$"),
+        (of_size(30000, 30000), "at most 67108864 pixels, found many more; crop it, or lower"),
+        (of_size(10000, 10000), "at most 67108864 pixels, found 10000 x 10000; crop it, or lower"),
         (b"PK\x03\x04\x14\0", "a picture, found a ZIP archive; unpack it$"),
         *(
             (encode(PICTURE, extension)[:500], "a picture, found a picture that is damaged$")

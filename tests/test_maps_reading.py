@@ -227,4 +227,4 @@ def _opened(blocked):
     areas, _ = scipy.ndimage.label(~walls)
     area = areas == 1 + np.argmax(np.bincount(areas[~walls], minlength=2)[1:])
     nodes = nodes_of(_positions(blocked), _cell_of(walls.shape), walls.shape, _RESOLUTION)
-    return walls, open_ways(walls, area & ~walls, np.zeros_like(walls), nodes)
+    return walls, open_ways(walls, area & ~walls, np.zeros_like(walls), nodes, 1.0)

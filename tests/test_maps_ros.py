@@ -140,6 +140,16 @@ class TestMapSaver:
         assert remarks()[0].startswith("map: shade 205 read as unknown, as map_saver means it, though free_thresh 0.25")
 
 
+def test_the_shade_of_unknown_is_read_so_in_a_retouched_map_but_not_where_it_is_rare(tmp_path, remarks):
+    picture = drawn("???????? ??####?? ??#..#?? ??#..#?? ??####?? ????????", pixels=4)
+    picture[10, 10:13] = 255, 90, 128  # of an eraser and of soft lines
+    path = write_map(tmp_path, picture, free_thresh=0.25)
+    assert (read_occupancy(path).states == -1).sum() == (48 - 16) * 16 + 2
+    rare = np.full((20, 20), 254, dtype=np.uint8)
+    rare[0], rare[1], rare[2, :4] = 0, 255, 205
+    assert (read_occupancy(write_map(tmp_path, rare, free_thresh=0.25)).states == -1).sum() == 0
+
+
 SURROUNDED = "????????? ??#####?? ??#...#?? ??#.?.#?? ??#...#?? ??#####?? ?????????"
 
 
@@ -195,12 +205,12 @@ class TestMaze:
         assert read_maze(path, cell_size=float(nearest)).cell_size == float(nearest)
 
     def test_a_door_that_no_cell_fits_into_is_opened_and_this_is_said(self, tmp_path, remarks):
-        picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=10)
-        picture[20:29, 40:50] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
+        picture = drawn("########### #....#....# #....#....# #....#....# #....#....# ###########", pixels=10)
+        picture[20:29, 50:60] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
         path = write_map(tmp_path, picture, resolution=0.05)
-        assert len(read_maze(path, cell_size=0.5).free_cells) == 9 + 9 + 1
+        assert len(read_maze(path, cell_size=0.5).free_cells) == 16 + 16 + 1
         (line,) = remarks()
-        assert "; 1 cell opened where a body 0.3 m wide passes on the map; 5 x 9" in line
+        assert "; 1 cell opened where a body 0.3 m wide passes on the map; 6 x 11" in line
 
     def test_rooms_that_are_lost_are_named_with_their_place_and_the_width_of_the_way(self, tmp_path, remarks):
         picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=20)

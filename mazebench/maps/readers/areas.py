@@ -21,6 +21,7 @@ from mazebench.maps.places import cell_of_place
 # Shares of the free cells: of an area that may be the building, and of one that is preferred to the ground around it.
 _WORTH_LISTING, _FAIR_SIZE = 0.02, 0.05
 _GROUND_EDGE = 0.2  # share of the edge from which an area is ground; a building reaches the edge at its doors
+_OPENING = 2.4  # m, the widest door between a building and the ground around it
 _MOST_LISTED = 5
 _MOST_PHASES = 8  # along an axis
 _WORTH_SHIFTING = 1.1  # times the floor of cells from the corner on, for which they begin elsewhere
@@ -156,6 +157,27 @@ def choose(areas: list[Area], enclosed: list[Enclosed], place: str | None, cell_
         if (cell >= 0).all() and (cell < len(walls)).all() and not walls[tuple(cell)]:
             return number, True
     return default, False
+
+
+def outside_of(free: np.ndarray, beyond: np.ndarray, cell_size: float) -> np.ndarray:
+    """Returns the free cells that lie outside of the walls: not behind a door, as seen from beyond the picture.
+
+    Args:
+      free: `[R, C]` bool.
+      beyond: `[R, C]` bool, cells that the picture does not show; around all cells is more of it.
+      cell_size: in metres.
+    """
+    around = np.pad(beyond, 1, constant_values=True)
+    around = cv2.dilate(around.astype(np.uint8), np.ones((3, 3))) > 0
+    open_ground = np.pad(free, 1) | around
+    far = _OPENING / 2 / cell_size
+    wide = cv2.distanceTransform(
+        np.pad(open_ground, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+    )
+    core, _ = scipy.ndimage.label((wide[1:-1, 1:-1] > far) | around)
+    ground = np.isin(core, core[around])
+    near = cv2.distanceTransform((~ground).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= far
+    return near[1:-1, 1:-1] & free
 
 
 def _building(areas: list[Area]) -> Area:

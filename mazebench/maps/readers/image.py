@@ -52,7 +52,7 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
         raise MazeError(
             f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
         ) from error
-    raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {found}")
+    raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {found}; crop it, or lower its resolution")
 
 
 def _as_array(picture: PIL.Image.Image) -> np.ndarray:

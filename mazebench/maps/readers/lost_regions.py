@@ -10,7 +10,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-_STEP = 0.05  # m, to which the width of a way is measured
+_STEP, _SLACK = 0.05, 1e-6  # m, to which the width of a way is measured; of the rounded distances
 
 
 class Lost(NamedTuple):
@@ -35,7 +35,7 @@ def lost_regions(
       radius: m, of the body.
       least: m2.
     """
-    is_far = (clear > radius) & ~near
+    is_far = (clear > radius + _SLACK) & ~near
     if is_far.sum() * resolution**2 < least:
         return []
     _, regions, stats, _ = cv2.connectedComponentsWithStats(is_far.astype(np.uint8), connectivity=4)
@@ -55,7 +55,7 @@ def lost_regions(
     for width in np.arange(2 * radius, _STEP / 2, -_STEP).tolist():
         if not numbers or all(widths.values()):
             break
-        for number, is_reached in zip(numbers, reach_from(begin, clear > width / 2, at), strict=True):
+        for number, is_reached in zip(numbers, reach_from(begin, clear > width / 2 + _SLACK, at), strict=True):
             widths[number] = widths[number] or width * bool(is_reached)
     lost = []
     for number in numbers:

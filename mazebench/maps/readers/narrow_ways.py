@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-WORTH_REACHING = 1.0  # m2, of the positions in a region that is opened, or named where it is lost
+WORTH_REACHING = 1.0  # m2, of the positions in a region to which a way is opened
 _ON_FREE_CELLS = 1e-6  # the cost of a step to a free cell, where one to a wall costs 1
 _NEVER = 1e9  # the cost of a step to a node through which no way may lead
 _MAX_TRIES = 300  # ways that are tried in one map
@@ -104,17 +104,19 @@ def _pairs(pixels: np.ndarray, axis: int, number: int) -> np.ndarray:
     return pixels[along] if axis == 0 else pixels[:, along]
 
 
-def open_ways(walls: np.ndarray, area: np.ndarray, shut: np.ndarray, nodes: Nodes) -> np.ndarray:
+def open_ways(walls: np.ndarray, area: np.ndarray, shut: np.ndarray, nodes: Nodes, least: float) -> np.ndarray:
     """Returns walls in which an area is joined with the regions that the body reaches from it: `[R, C]` bool.
 
-    A region counts from `WORTH_REACHING`. The cells that are opened are the fewest along a way of the body, and each
-    has a position on that way. None is opened that would join cells beside it between which the body can't move there.
+    If one of them has at least `least` m2, ways to all from `WORTH_REACHING` are opened. The cells that are opened are
+    the fewest along a way of the body, and each has a position on that way. None is opened that would join cells beside
+    it between which the body can't move there.
 
     Args:
       walls: `[R, C]` bool.
       area: `[R, C]` bool, a connected area of free cells.
       shut: `[R, C]` bool, cells that no way may lead through.
       nodes: the positions of the body.
+      least: m2.
     """
     walls = walls.copy()
     if (reached := _reached(nodes, area, shut)) is None:
@@ -125,7 +127,7 @@ def open_ways(walls: np.ndarray, area: np.ndarray, shut: np.ndarray, nodes: Node
         free, _ = scipy.ndimage.label(~walls)
         area = free == free[area].max()
         region = _largest_far(reached, area, ~is_left_out)
-        if region is None:
+        if region is None or (not way_through and reached.areas[region].sum() < least):
             break
 
         # The way of the body to the free cells in the region, or to its end, on which the fewest walls are opened.

@@ -18,7 +18,19 @@ from mazebench.constants import SLIDER_RADIUS
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.areas import Area, Cells, Rim, areas_of, choose, describe_areas, enclose, lay_cells
+from mazebench.maps.places import cell_of_place
+from mazebench.maps.readers.areas import (
+    Area,
+    Cells,
+    Enclosed,
+    Rim,
+    areas_of,
+    choose,
+    describe_areas,
+    enclose,
+    lay_cells,
+    outside_of,
+)
 from mazebench.maps.readers.directions import turn_of_walls
 from mazebench.maps.readers.lost_regions import lost_regions, reach_from
 from mazebench.maps.readers.narrow_ways import WORTH_REACHING, nodes_of, open_ways
@@ -30,7 +42,7 @@ _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
 _TIE = 1e-6  # of a pixel or cell, by which a centre on an edge lies right of it or above
 _ROWS_AT_ONCE = 256
 _MANY_CLOSED = 0.05  # share of the body's positions of which a user would miss rooms
-_WORTH_NAMING, _MOST_NAMED = 2.0, 3  # m2 of positions in a region that is lost; such regions
+_MANY_LOST, _MOST_NAMED = 2.0, 3  # m2 of positions in a region whose loss a user is told; such regions
 _MIN_INVERTED = 0.25  # share of wall from which one connected wall in free cells is taken for the free cells
 
 
@@ -54,6 +66,21 @@ class LocatedMaze(NamedTuple):
 
     maze: Maze
     origin: Pose = (0.0, 0.0, 0.0)  # of the maze's lower left corner in the map's frame
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Seen:
+    """The pixels of a map as they lie, and the cells over them."""
+
+    picture: OccupancyGrid
+    clear: np.ndarray  # [H, W] float, m to the nearest blocked pixel
+    cell_of: np.ndarray  # [H, W] int, row * C + column, -1 where no cell is
+    is_turned: bool  # whether the cells are
+
+    def outside(self, walls: np.ndarray, cell_size: float) -> np.ndarray:
+        """Returns the free cells that lie outside of all walls: `[R, C]` bool."""
+        is_shown = np.bincount(self.cell_of[self.cell_of >= 0], minlength=walls.size).reshape(walls.shape) > 0
+        return outside_of(~walls, ~is_shown, cell_size)
 
 
 def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: tuple[int, int]) -> np.ndarray:
@@ -138,11 +165,9 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
             _require_not_inverted(grid.states, name)
 
     # Which pixels can't be driven on, and the cells made of them, along the walls if these are slanted.
-    picture = _known_part(grid)
-    turn = 0.0
+    picture, turn, all_states = _known_part(grid), 0.0, grid.states
     if not grid.is_cells and _fewest_pixels(grid.resolution) > 1:
         turn = turn_of_walls(picture.states == FREE, picture.states == OCCUPIED, grid.resolution)
-    shape = "{1} x {0}".format(*grid.states.shape)
     grid = _turned(picture, turn) if turn else grid
     part = _known_part(grid)
     blocked = blocked_pixels(part.states, options, grid.resolution)
@@ -151,7 +176,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     rim = _rim(picture, part, cell_size) if turn else None
     cells = lay_cells(blocked, pixels, rim)
     if cells.walls.all():
-        wall, unknown, free = (100 * (grid.states == state).mean() for state in (OCCUPIED, UNKNOWN, FREE))
+        wall, unknown, free = (100 * (all_states == state).mean() for state in (OCCUPIED, UNKNOWN, FREE))
         raise MazeError(
             f"{name}: expected a free cell of {cell_size:g} m, found none; {wall:.0f} % of the map is wall, "
             f"{unknown:.0f} % unknown, {free:.0f} % free{'; ' * bool(grid.shades)}{grid.shades}"
@@ -161,18 +186,26 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     areas = areas_of(cells, blocked, rim)
     enclosed = [enclose(area.cells, 0 if grid.is_cells else MIN_SIZE) for area in areas]
     number, is_found = choose(areas, enclosed, options.area, cell_size)
-    num_opened = 0
+    changes, lost = [], ""
     if pixels > 1:
-        cell_of = _cells_of_pixels(picture, part, cells)
-        clear = _clearance(blocked_pixels(picture.states, options, grid.resolution), grid.resolution) > radius
-        open_walls = _with_ways(cells, areas, number, clear, cell_of, grid.resolution)
-        num_opened = int((cells.walls & ~open_walls).sum())
-    if num_opened:
-        inside = areas[number].cells
-        cells = cells._replace(walls=open_walls)
-        areas = areas_of(cells, blocked, rim)
-        enclosed = [enclose(area.cells, MIN_SIZE) for area in areas]
-        number = next(index for index, area in enumerate(areas) if (area.cells & inside).any())
+        seen = _Seen(picture, _clearance(picture, options), _cells_of_pixels(picture, part, cells), turn != 0)
+        walls = _with_ways(seen, cells.walls, areas, number, radius)
+        if num_opened := int((cells.walls & ~walls).sum()):
+            count = f"{num_opened} cell{'s' * (num_opened > 1)}"
+            changes.append(f"{count} opened where a body {2 * radius:g} m wide passes on the map")
+        place = tuple(np.argwhere(areas[number].cells)[0])
+        outside = seen.outside(walls, cell_size) if areas[number].is_ground else np.zeros_like(walls)
+        if options.area is not None and is_found:
+            row, column = cell_of_place(options.area, len(enclosed[number].walls), cell_size)
+            place = row + enclosed[number].row, column + enclosed[number].column
+            walls = walls if outside[place] else walls | outside
+        if (walls != cells.walls).any():
+            cells = cells._replace(walls=walls)
+            areas = areas_of(cells, blocked, rim)
+            enclosed = [enclose(area.cells, MIN_SIZE) for area in areas]
+            number = next(index for index, area in enumerate(areas) if area.cells[place])
+        changes += _describe_outside(areas[number], enclosed[number], outside)
+        lost = _describe_lost(seen, pixels, areas, number, options, radius)
     row, column, height, width, walls = enclosed[number]
     size = len(walls)
     if size > MAX_SIZE:
@@ -190,20 +223,18 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     origin = x + cosine * right - sine * up, y + sine * right + cosine * up, yaw
 
     # What a user should know.
-    changes = [*grid.changes, *["nothing on it is wall"] * (not (picture.states == OCCUPIED).any())]
     if pixels > 1:
         along = f" that are turned by {math.degrees(turn):.1f} degrees, along the walls" if turn else ""
-        changes.append(f"{shape} pixels of {grid.resolution:g} m as cells of {cell_size:g} m{along}")
-    if num_opened:
-        count = f"{num_opened} cell{'s' * (num_opened > 1)}"
-        changes.append(f"{count} opened where a body {2 * radius:g} m wide passes on the map")
+        shape = "{1} x {0}".format(*all_states.shape)
+        coarser = f"{shape} pixels of {grid.resolution:g} m as cells of {cell_size:g} m{along}"
+        changes = [coarser, *changes]
+    changes = [*grid.changes, *["nothing on it is wall"] * (not (picture.states == OCCUPIED).any()), *changes]
     if len(areas) > 1:
         changes.append(describe_areas(areas, enclosed, number, cell_size))
     if not is_found:
         changes.append(f"none has {options.area}")
     num_free = int((~cells.walls).sum())
-    num_closed = num_free - areas[number].num_cells
-    if num_closed:
+    if num_closed := num_free - areas[number].num_cells:
         share = f"{num_closed:,} of {num_free:,} free cells ({100 * num_closed / num_free:.0f} %)"
         changes.append(f"{share} closed that can't be reached from the others")
     beyond = np.array([from_top + (height - 1) * pixels, from_left + (width - 1) * pixels]) - grid.states.shape
@@ -215,8 +246,8 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
         changes.append(f"its cell (r, c) is ({_shifted('r', from_top)}, {_shifted('c', from_left)}) in the maze")
     if changes or from_left or from_below:
         remark(f"{name}: {'; '.join([*changes, _describe_corner(origin)])}")
-    if pixels > 1 and (line := _describe_lost(picture, cells, cell_of, areas, number, options, radius)):
-        remark(f"{name}: {line}")
+    if lost:
+        remark(f"{name}: {lost}")
     return LocatedMaze(maze, origin)
 
 
@@ -249,28 +280,27 @@ def _turned(grid: OccupancyGrid, turn: float) -> OccupancyGrid:
     return dataclasses.replace(grid, states=states_in_cells(grid, origin, grid.resolution, shape), origin=origin)
 
 
+def _pixels_on(
+    part: OccupancyGrid, picture: OccupancyGrid, rows: np.ndarray, columns: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns on which rows and columns of pixels of `part` those of a picture have their centre."""
+    right = (columns + 0.5) * picture.resolution
+    up = (len(picture.states) - rows - 0.5) * picture.resolution
+    x, y = _transformed(_moved(picture.origin, part.origin), right, up)
+    from_below, from_left = (np.floor(along / part.resolution + _TIE).astype(np.int32) for along in (y, x))
+    return len(part.states) - 1 - from_below, from_left
+
+
 def _rim(picture: OccupancyGrid, part: OccupancyGrid, cell_size: float) -> Rim | None:
-    """Returns the edge of a picture, in pixels of it that are turned; None if no pixel at the edge is free."""
-    height, width = picture.states.shape
-    inward = math.ceil(1.5 * cell_size / picture.resolution)
-    rows, columns = (
-        np.concatenate(parts)
-        for parts in (
-            (np.zeros(width), np.full(width, height - 1), np.arange(height), np.arange(height)),
-            (np.arange(width), np.arange(width), np.zeros(height), np.full(height, width - 1)),
-        )
-    )
-    is_free = picture.states[rows.astype(int), columns.astype(int)] == FREE
-    if not is_free.any():
-        return None
-    inner_rows = np.clip(rows, min(inward, height // 2), max(height - 1 - inward, height // 2))
-    inner_columns = np.clip(columns, min(inward, width // 2), max(width - 1 - inward, width // 2))
-    at = [each * picture.resolution for each in (inner_columns + 0.5, height - inner_rows - 0.5)]
-    x, y = _transformed(_moved(picture.origin, part.origin), *at)
-    from_top = len(part.states) - 1 - np.floor(y / part.resolution)
-    return Rim(
-        np.where(is_free, from_top, -1).astype(int), np.where(is_free, np.floor(x / part.resolution), -1).astype(int)
-    )
+    """Returns the edge of a picture, in pixels of `part`; None if no pixel at the edge is free."""
+    edge = np.ones(picture.states.shape, dtype=bool)
+    edge[1:-1, 1:-1] = False
+    places = np.argwhere(edge)
+    is_free = picture.states[edge] == FREE
+    last: np.ndarray = np.array(edge.shape) - 1
+    inward = np.minimum(math.ceil(1.5 * cell_size / picture.resolution), last // 2)
+    rows, columns = _pixels_on(part, picture, *np.clip(places, inward, last - inward).T)
+    return Rim(np.where(is_free, rows, -1), np.where(is_free, columns, -1)) if is_free.any() else None
 
 
 def _cells_of_pixels(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells) -> np.ndarray:
@@ -279,57 +309,67 @@ def _cells_of_pixels(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells) 
     `part` is the map that the cells were laid on.
     """
     height, width = picture.states.shape
-    right, up = (
-        (np.arange(width) + 0.5) * part.resolution,
-        (height - np.arange(height)[:, None] - 0.5) * part.resolution,
-    )
-    x, y = _transformed(_moved(picture.origin, part.origin), right, up)
+    rows, columns = _pixels_on(part, picture, np.arange(height)[:, None], np.arange(width)[None])
+    rows, columns = (rows - cells.down) // cells.pixels, (columns - cells.right) // cells.pixels
     num_rows, num_columns = cells.walls.shape
-    from_top = len(part.states) - 1 - np.floor(y / part.resolution + _TIE).astype(np.int32)
-    columns = (np.floor(x / part.resolution + _TIE).astype(np.int32) - cells.right) // cells.pixels
-    rows = (from_top - cells.down) // cells.pixels
     is_laid = (rows >= 0) & (rows < num_rows) & (columns >= 0) & (columns < num_columns)
     return np.where(is_laid, rows * np.int32(num_columns) + columns, np.int32(-1))
 
 
-def _with_ways(
-    cells: Cells, areas: list[Area], number: int, clear: np.ndarray, cell_of: np.ndarray, resolution: float
-) -> np.ndarray:
-    """Returns walls of cells in which one of the areas is joined with what a body reaches from it.
+def _clearance(picture: OccupancyGrid, options: ReadOptions) -> np.ndarray:
+    """Returns the distance from the centre of each pixel to that of the nearest blocked one: `[H, W]`, in m."""
+    free = np.pad(~blocked_pixels(picture.states, options, picture.resolution), 1).astype(np.uint8)
+    return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] * picture.resolution
 
-    `clear` is where its centre may be: `[H, W]` bool. The ground around a building is not joined with it.
-    """
-    area, beside = areas[number].cells, np.ones((3, 3))
-    near = cv2.dilate(area.astype(np.uint8), beside) > 0
-    if np.sum(clear & ~near.ravel()[cell_of]) * resolution**2 < WORTH_REACHING:
-        return cells.walls
-    ground = sum(
-        (other.cells for other in areas if other.is_ground and other is not areas[number]), np.zeros_like(area)
-    )
-    shut = cv2.dilate(ground.astype(np.uint8), beside) > 0
-    return open_ways(cells.walls, area, shut, nodes_of(clear, cell_of, area.shape, resolution))
+
+def _with_ways(seen: _Seen, walls: np.ndarray, areas: list[Area], number: int, radius: float) -> np.ndarray:
+    """Returns walls in which one of the areas is joined with what a body reaches from it, but not with the ground."""
+    area, positions = areas[number].cells, seen.clear > radius
+    if np.sum(positions & ~_grown(area).ravel()[seen.cell_of]) * seen.picture.resolution**2 < WORTH_REACHING:
+        return walls
+    nodes = nodes_of(positions, seen.cell_of, area.shape, seen.picture.resolution)
+    least = (
+        WORTH_REACHING if seen.is_turned else _MANY_LOST
+    )  # cells along the picture stay as they are if little is lost
+    return open_ways(walls, area, _grown(_ground(areas, number)), nodes, least)
+
+
+def _ground(areas: list[Area], number: int) -> np.ndarray:
+    """Returns the cells of the areas around a building, apart from the one that is asked for: `[R, C]` bool."""
+    others = [area.cells for area in areas if area.is_ground and area is not areas[number]]
+    return np.any([np.zeros_like(areas[number].cells), *others], axis=0)
+
+
+def _grown(cells: np.ndarray) -> np.ndarray:
+    """Returns some cells and those that touch them: `[R, C]` bool."""
+    return cv2.dilate(cells.astype(np.uint8), np.ones((3, 3))) > 0
+
+
+def _describe_outside(area: Area, enclosed: Enclosed, outside: np.ndarray) -> list[str]:
+    """Returns how much of a maze is ground around the building and how it is left out, in words; [] if none counts."""
+    num_outside, rooms = int((outside & area.cells).sum()), area.cells & ~outside
+    parts, _ = scipy.ndimage.label(rooms)
+    building = rooms & (parts == np.bincount(parts[rooms], minlength=1).argmax())
+    if min(num_outside, building.sum()) <= _MANY_CLOSED * area.num_cells:
+        return []
+    row, column = np.argwhere(building)[0] - (enclosed.row, enclosed.column)
+    share = 100 * num_outside / area.num_cells
+    return [f"{share:.0f} % of the maze lies outside of the walls, --area {row},{column} leaves it out"]
 
 
 def _describe_lost(
-    picture: OccupancyGrid,
-    cells: Cells,
-    cell_of: np.ndarray,
-    areas: list[Area],
-    number: int,
-    options: ReadOptions,
-    radius: float,
+    seen: _Seen, pixels: int, areas: list[Area], number: int, options: ReadOptions, radius: float
 ) -> str:
     """Returns which free regions of a map are not in the maze, how wide the ways there are, and what helps, in words.
 
     It is empty if nothing that counts is lost. The ground around a building is not meant.
     """
-    area, beside = areas[number].cells, np.ones((3, 3))
-    ground = sum((other.cells for other in areas if other.is_ground), np.zeros_like(area)) & ~area
-    is_near = cv2.dilate((area | ground).astype(np.uint8), beside).ravel() > 0
-    kept = area.ravel()[cell_of] & (cell_of >= 0)
+    picture, area = seen.picture, areas[number].cells
+    is_near = _grown(area | _ground(areas, number)).ravel()[seen.cell_of]
+    kept = area.ravel()[seen.cell_of] & (seen.cell_of >= 0)
     bare = dataclasses.replace(options, inflate=0.0)
-    clear = _clearance(blocked_pixels(picture.states, bare, picture.resolution), picture.resolution)
-    lost = lost_regions(clear, kept, is_near[cell_of], picture.resolution, radius, _WORTH_NAMING)
+    clear = _clearance(picture, bare) if options.inflate else seen.clear
+    lost = lost_regions(clear, kept, is_near, picture.resolution, radius, _MANY_LOST)
     share = sum(region.area for region in lost) / (np.sum(clear > radius) * picture.resolution**2 + 1e-9)
     if not (any(region.width for region in lost) or share > _MANY_CLOSED):
         return ""
@@ -350,23 +390,16 @@ def _describe_lost(
     inside = np.flatnonzero(kept)
     is_within_reach = np.array([region.width >= 2 * radius - _TIE for region in lost])
     advice = {
-        "a smaller --cell-size": cells.pixels > _fewest_pixels(picture.resolution),
+        "a smaller --cell-size": pixels > _fewest_pixels(picture.resolution),
         "a smaller --inflate": options.inflate > 0,
     }
     ways = [way for way, helps in advice.items() if helps and is_within_reach.any()]
     if options.unknown == "wall" and not is_within_reach.all():
-        known = blocked_pixels(picture.states, dataclasses.replace(bare, unknown="free"), picture.resolution)
-        through = reach_from(inside, _clearance(known, picture.resolution) > radius, places)
+        through = reach_from(inside, _clearance(picture, dataclasses.replace(bare, unknown="free")) > radius, places)
         ways += ["--unknown free"] * bool((through & ~is_within_reach).any())
     if options.pixel_size is not None and not is_within_reach.all():
         ways.append("without text, furniture and door swings on the plan")
     return f"{line}; try {', or '.join(ways)}" if ways else line
-
-
-def _clearance(blocked: np.ndarray, resolution: float) -> np.ndarray:
-    """Returns the distance from the centre of each pixel to that of the nearest one that is blocked: `[H, W]`, in m."""
-    free = np.pad(~blocked, 1).astype(np.uint8)
-    return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] * resolution
 
 
 def _require_not_inverted(states: np.ndarray, name: str) -> None:

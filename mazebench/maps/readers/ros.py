@@ -185,11 +185,10 @@ def read_occupancy(path: pathlib.Path) -> OccupancyGrid:
         raise InputError(f"{path}: {error}") from error
     states = _states(picture, metadata)
 
-    # The departure from map_server.
-    is_unknown = _saved_as_unknown(picture)
     named = path.parent / os.path.expanduser(metadata.image.removeprefix("file://"))
     changes = [] if named == image else [f"image {metadata.image} taken from {image.parent}"]
-    if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
+    is_departure = metadata.mode == "trinary" and _state_of_shades(metadata)[_UNKNOWN_SHADE] == FREE
+    if is_departure and (is_unknown := _saved_as_unknown(picture)).any():
         states[is_unknown] = UNKNOWN
         changes.append(
             f"shade {_UNKNOWN_SHADE} read as unknown, as map_saver means it, though free_thresh "
@@ -297,10 +296,11 @@ def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
 def _saved_as_unknown(picture: np.ndarray) -> np.ndarray:
     """Returns `[H, W]` bool: the pixels of the shade of unknown, if it is one of the commonest; else none."""
     colors = picture[..., :3] if picture.ndim == 3 else picture[..., None]
-    is_unknown = np.all(colors == _UNKNOWN_SHADE, axis=-1)
-    is_gray = np.all(colors == colors[..., :1], axis=-1)
-    counts = np.sort(np.bincount(colors[..., 0][is_gray]))
-    return is_unknown & bool(is_unknown.sum() >= counts[-_SAVED_SHADES:].min(initial=1))
+    shades = colors[..., 0]
+    is_gray = (colors == shades[..., None]).all(axis=-1)
+    counts = np.bincount(shades[is_gray], minlength=_UNKNOWN_SHADE + 1)
+    is_common = counts[_UNKNOWN_SHADE] >= np.sort(counts)[-_SAVED_SHADES]
+    return is_gray & (shades == _UNKNOWN_SHADE) & is_common
 
 
 def _state_of_shades(metadata: _Metadata) -> np.ndarray:
