@@ -23,6 +23,8 @@ Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
+_TIE = 1e-6  # of a pixel or cell, by which a centre on an edge lies right of it or above
+_ROWS_AT_ONCE = 256
 _MANY_CLOSED = 0.05  # share of the free cells of which a user would miss rooms
 _MIN_INVERTED = 0.25  # share of wall from which one connected wall in free cells is taken for the free cells
 
@@ -47,6 +49,66 @@ class LocatedMaze(NamedTuple):
 
     maze: Maze
     origin: Pose = (0.0, 0.0, 0.0)  # of the maze's lower left corner in the map's frame
+
+
+def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: tuple[int, int]) -> np.ndarray:
+    """Returns the states of cells that are laid over a map at any pose: `[R, C]` int8.
+
+    A cell has the pixels whose centre lies in it, and the one under its own centre. It is OCCUPIED if one of them is,
+    else UNKNOWN if one is or lies outside of the map, else FREE.
+
+    Args:
+      grid: the map.
+      origin: of the cells' lower left corner, in the frame of the map's own origin.
+      cell_size: in metres; it may be below the resolution.
+      shape: R and C.
+    """
+    states = np.pad(grid.states, 1, constant_values=UNKNOWN)
+    height, width = states.shape
+    corner = np.array([-1.0, -1.0]) * grid.resolution  # of the padded pixels, in the frame that is turned as the map is
+    cells_in_map = _moved(origin, grid.origin)
+    map_in_cells = _moved(grid.origin, origin)
+
+    # The pixel under the centre of each cell; some rows at a time, as there may be as many cells as pixels.
+    laid = np.empty(shape, dtype=np.int8)
+    right = (np.arange(shape[1]) + 0.5) * cell_size
+    for begin in range(0, shape[0], _ROWS_AT_ONCE):
+        rows = np.arange(begin, min(begin + _ROWS_AT_ONCE, shape[0]))
+        x, y = _transformed(cells_in_map, right, (shape[0] - rows[:, None] - 0.5) * cell_size)
+        columns = np.clip(np.floor((x - corner[0]) / grid.resolution + _TIE), 0, width - 1).astype(np.intp)
+        from_below = np.clip(np.floor((y - corner[1]) / grid.resolution + _TIE), 0, height - 1).astype(np.intp)
+        laid[rows] = states[height - 1 - from_below, columns]
+
+    # The cell of each pixel at the rim of its state; what is inside of an area lies with others of it.
+    for state in (UNKNOWN, OCCUPIED):
+        has_state = (states == state).astype(np.uint8)
+        rows, columns = np.nonzero(has_state & (cv2.erode(has_state, np.ones((3, 3)), borderValue=0) == 0))
+        x, y = _transformed(
+            map_in_cells,
+            corner[0] + (columns + 0.5) * grid.resolution,
+            corner[1] + (height - rows - 0.5) * grid.resolution,
+        )
+        to_right, up = (np.floor(along / cell_size + _TIE).astype(np.intp) for along in (x, y))
+        down = shape[0] - 1 - up
+        is_inside = (down >= 0) & (down < shape[0]) & (to_right >= 0) & (to_right < shape[1])
+        down, to_right = down[is_inside], to_right[is_inside]
+        laid[down, to_right] = np.where(laid[down, to_right] == OCCUPIED, OCCUPIED, state)
+    return laid
+
+
+def _moved(origin: Pose, into: Pose) -> Pose:
+    """Returns an origin in the frame of another origin."""
+    x, y, yaw = origin
+    cosine, sine = math.cos(into[2]), math.sin(into[2])
+    right, up = x - into[0], y - into[1]
+    return cosine * right + sine * up, cosine * up - sine * right, yaw - into[2]
+
+
+def _transformed(origin: Pose, right: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns points that are given from an origin in the frame of that origin; exactly so if it is not turned."""
+    x, y, yaw = origin
+    cosine, sine = (math.cos(yaw), math.sin(yaw)) if yaw else (1.0, 0.0)
+    return x + cosine * right - sine * up, y + sine * right + cosine * up
 
 
 def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> LocatedMaze:
