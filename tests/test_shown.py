@@ -90,15 +90,15 @@ def test_distances_are_those_of_cells_that_are_joined_on_both_maps(remarks):
     spec = Task.of(mazes=Maze(ring), shown=older)
     assert max(spec.distances) == 10
     assert draw_trials(spec, 1)
-    assert "0.92 of the free space is common with maze; 0 cells are wall now, 2 are free now" in remarks()[-1]
+    assert "1.00 of the smaller free space is common with maze; 0 m2 are wall now, 2 m2 are free now" in remarks()[-1]
     with pytest.raises(InputError, match="at most 10 cells"):
         Task.of(mazes=Maze(ring), shown=older, distances=(11,))
 
 
-def test_a_map_that_fits_better_elsewhere_is_told_of(remarks):
+def test_of_a_map_that_fits_badly_a_line_names_the_option_that_aligns(remarks):
     maze = house()
     Task.of(mazes=maze, shown=np.roll(maze.walls, 1, axis=1))
-    assert "; moved by (-1, 0) m it would be " in remarks()[-1]
+    assert "; few walls lie on each other: try --align" in remarks()[-1]
 
 
 def test_a_report_has_results_with_an_older_map(tmp_path):
@@ -142,13 +142,18 @@ class TestRosMaps:
         assert (spec.mazes[0].walls == older.walls).all()
         assert (spec.arena.shown[0].walls == maze.walls).all()
 
-    def test_another_yaw_or_place_is_refused_with_the_number(self, tmp_path):
+    def test_a_map_is_laid_at_the_yaw_of_its_origin(self, tmp_path):
+        maze = house(cell_size=0.5)
+        new = self.write(tmp_path, "new", maze, 5, (0.0, 0.0, 0.0))
+        quarter = Maze(np.rot90(maze.walls, -1), "old", 0.5)  # drawn clockwise, and turned back by its yaw
+        old = self.write(tmp_path, "old", quarter, 5, (15.5, 0.0, np.pi / 2))
+        task = Task.of("building", mazes=new, shown=old, cell_size=0.5)
+        assert (task.arena.shown[0].walls == maze.walls).all()
+
+    def test_another_place_is_refused_with_the_number(self, tmp_path):
         new = self.write(tmp_path, "new", house(cell_size=0.5), 5, (0.0, 0.0, 0.0))
-        turned = self.write(tmp_path, "turned", house(cell_size=0.5), 5, (0.0, 0.0, 0.1))
         moved = self.write(tmp_path, "moved", house(cell_size=0.5), 5, (7.0, 0.0, 0.0))
-        with pytest.raises(InputError, match=r"turned by 0 rad, as new is, found 0\.1"):
-            Task.of("building", mazes=new, shown=turned)
-        with pytest.raises(InputError, match=r"at least 0\.5 of the free space .* found 0\.\d\d"):
+        with pytest.raises(InputError, match=r"at least 0\.67 of the free space .* found 0\.\d\d; .* try --align"):
             Task.of("building", mazes=new, shown=moved)
 
 

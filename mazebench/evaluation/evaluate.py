@@ -21,7 +21,7 @@ from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.options import check_names, options_in
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
-from mazebench.results.records import Summary, counts_in
+from mazebench.results.records import PairFigures, Summary, counts_in
 from mazebench.storage.files import locked
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import TaskOptions
@@ -143,6 +143,11 @@ def run_plan(
             episodes=num_trials,
             provenance=plan.provenance,
             **metrics.summarize(records),
+            pairs={
+                older.maze.name: PairFigures(covered=older.pair.covered, pose=older.pair.pose, **older.pair.areas)
+                for older in plan.task.arena.shown or ()
+                if older.pair is not None
+            },
             counts=counts_in(records),
         )
         store.finish(records, summary)

@@ -1,8 +1,8 @@
 """The folder of an evaluation while it runs. What has ended survives a kill at any moment.
 
 The result of an episode that ends becomes a line of `journal.jsonl`, in any order, or with several goals a line for
-each leg. When all have ended, `episodes.jsonl`, `trajectories.npz` and last `summary.json` are written, and the journal
-is removed.
+each leg. When all have ended, `episodes.jsonl`, `trajectories.npz`, pictures of older maps and last `summary.json` are
+written, and the journal is removed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Result, to_record, to_trajectory
 from mazebench.evaluation.plan import Plan
+from mazebench.maps.pair import draw_pair
+from mazebench.maps.pictures import write_image
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
 from mazebench.results.records import Record, Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
@@ -157,6 +159,10 @@ class Store:
                 file.write("".join(each.to_line() for each in records).encode("utf-8"))
             if self.record:
                 save_trajectories(self.folder / TRAJECTORIES, [each for each in trajectories if each])
+            pairs = [(each.pair, each.maze) for each in self._plan.task.arena.shown or () if each.pair is not None]
+            for number, (pair, maze) in enumerate(pairs, 1):
+                name = f"pair-{number}.png" if len(pairs) > 1 else "pair.png"
+                write_image(draw_pair(pair, maze), self.folder / name)
             write_json(self.folder / SUMMARY, summary.to_dict())
             (self.folder / JOURNAL).unlink(missing_ok=True)
 

@@ -70,9 +70,11 @@ def read_mazes(path: str | pathlib.Path, size: int | None = None, **options: Any
 
 
 def read_with_older(
-    path: str | pathlib.Path, shown: str | pathlib.Path, options: ReadOptions
+    path: str | pathlib.Path, shown: str | pathlib.Path, options: ReadOptions, is_aligned: bool = False
 ) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...]]:
     """Reads the maze in a file or those in a folder, and their older maps: likewise, or one that is that of all.
+
+    Older maps are laid on the mazes as `lay_on` does.
 
     Raises:
       InputError: as `read_mazes`, and if there are other numbers of older maps, or one is no older map of its maze.
@@ -83,7 +85,8 @@ def read_with_older(
         newer = _read_grid(file, None, options)
         located = locate_maze(newer, options, file.stem)
         mazes.append(located.maze)
-        older.append(lay_on(_read_grid(older_file, None, options), newer, located, options, f"shown {older_file}"))
+        grid = _read_grid(older_file, None, options)
+        older.append(lay_on(grid, newer, located, options, f"shown {older_file}", is_aligned))
     return tuple(mazes), tuple(older)
 
 

@@ -7,22 +7,28 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
-import math
 from typing import Any
 
 import numpy as np
 import scipy
 
 from mazebench.errors import InputError, remark
+from mazebench.maps.align import LEAST_FIT, align, fit, moved
 from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.occupancy_grid import LocatedMaze, OccupancyGrid, blocked_pixels
+from mazebench.maps.pair import Pair, compared
+from mazebench.maps.readers.occupancy_grid import (
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    LocatedMaze,
+    OccupancyGrid,
+    blocked_pixels,
+    states_in_cells,
+)
 
-_LEAST_SHARED = 0.5  # of the free space of both maps together: less is another building, or another frame
-_MOVED = 2.0  # m, by which a map is tried elsewhere
-_BETTER = 0.05  # of the free space, by which it must fit better there for a user to be told
-_TURN = 1e-3  # rad
+_LEAST_COVERED = 2 / 3  # of the smaller free space; of maps of one size, half of the free space of both together
+_MOST_SQUARES = 8  # along a side of a cell, in which maps are compared
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,47 +37,12 @@ class OlderMap:
 
     walls: np.ndarray  # [N, N] bool, True is wall
     maze: Maze
+    pair: Pair | None = None  # None if the maze was made of the map
 
     @functools.cached_property
     def joined(self) -> np.ndarray:
         """`[N, N]` bool: the cells that are free in the maze and on the map, where ways on the map join them all."""
         return ~self.maze.walls & _largest_area(self.walls, self.maze)
-
-
-def older_map(walls: np.ndarray, maze: Maze, name: str) -> OlderMap:
-    """Returns an older map of `maze`, in whose cells `walls` (`[N, N]` bool) are.
-
-    What is free on it, but apart from the building, and wall in the maze, is closed, as it is where a maze is read.
-
-    Raises:
-      InputError: if it shares too little free space with the maze; `name` is that of the map.
-    """
-    walls = walls | (maze.walls & ~_largest_area(walls, maze))
-    walls[[0, -1]] = walls[:, [0, -1]] = True
-    walls.flags.writeable = False
-    shared = _shared(walls, maze.walls)
-    if shared < _LEAST_SHARED:
-        raise InputError(
-            f"{name}: expected an older map of {maze.name}, with at least {_LEAST_SHARED:g} of the free space of both "
-            f"in common, found {shared:.2f}; both must lie in one frame, in pixels finer than the cells"
-        )
-
-    # What a user should know: how much has changed, and whether the map fits better elsewhere.
-    most = round(_MOVED / maze.cell_size)
-    shifts = list(itertools.product(range(-most, most + 1), repeat=2))
-    fits = [_shared(np.roll(walls, shift, axis=(0, 1)), maze.walls) for shift in shifts]
-    down, right = shifts[int(np.argmax(fits))]
-    better = f"; moved by ({right * maze.cell_size:g}, {-down * maze.cell_size:g}) m it would be {max(fits):.2f}"
-    remark(
-        f"{name}: {shared:.2f} of the free space is common with {maze.name}; {np.sum(maze.walls & ~walls)} cells are "
-        f"wall now, {np.sum(walls & ~maze.walls)} are free now{better * (max(fits) > shared + _BETTER)}"
-    )
-    return OlderMap(walls, maze)
-
-
-def _shared(walls: np.ndarray, others: np.ndarray) -> float:
-    """Returns the intersection over union of what is free on two maps `[N, N]` bool."""
-    return float(np.sum(~(walls | others)) / max(1, np.sum(~(walls & others))))
 
 
 def one_for_each(shown: list[Any], num_mazes: int) -> list[Any]:
@@ -86,12 +57,18 @@ def one_for_each(shown: list[Any], num_mazes: int) -> list[Any]:
 
 
 def lay_on(
-    older: OccupancyGrid, newer: OccupancyGrid, located: LocatedMaze, options: ReadOptions, name: str
+    older: OccupancyGrid,
+    newer: OccupancyGrid,
+    located: LocatedMaze,
+    options: ReadOptions,
+    name: str,
+    is_aligned: bool = False,
 ) -> OlderMap:
-    """Returns an older map in the cells of a maze that was read from a newer one.
+    """Returns an older map in the cells of a maze that was read from a newer one, and remarks how they differ.
 
     Maps of ROS are laid on each other by their origins. Pictures and cells must have one height and width. A cell is
-    wall if one of its pixels is, or lies outside of the older map.
+    wall if one of its pixels is, or is unknown, or lies outside of the older map. What is free on the older map, but
+    apart from the building, and wall in the maze, is closed, as it is where a maze is read.
 
     Args:
       older: the pixels of the older map.
@@ -99,13 +76,54 @@ def lay_on(
       located: the maze, and where it lies on the newer map.
       options: of reading either.
       name: of the older map.
+      is_aligned: True if the older map is turned and moved by `align` first, instead of being laid by its origin.
 
     Raises:
-      InputError: if they can't be laid on each other, or share too little free space.
+      InputError: if they can't be laid on each other, or the larger one covers too little of the free space of the
+        smaller one.
     """
-    maze, (x, y, yaw) = located
-    if newer.is_cells and older.is_cells:
-        older = dataclasses.replace(older, resolution=maze.cell_size)
+    maze, pose = located.maze, None
+    older, newer = (
+        dataclasses.replace(grid, resolution=maze.cell_size) if grid.is_cells else grid for grid in (older, newer)
+    )
+    if is_aligned:
+        pose = align(older, newer, name)
+        older = moved(older, pose)
+    else:
+        _require_one_frame(older, newer, name, maze.name)
+    covered, met = fit(older, newer)
+    if covered < _LEAST_COVERED:
+        raise InputError(
+            f"{name}: expected an older map of {maze.name}, with at least {_LEAST_COVERED:.2f} of the free space of "
+            f"the smaller one in common, found {covered:.2f}; "
+            + ("it lies where its walls fit best" if is_aligned else "if it is turned or moved, try --align")
+        )
+
+    # Its walls in the cells of the maze; what is not shown is wall.
+    blocked = dataclasses.replace(
+        older, states=np.where(blocked_pixels(older.states, options, older.resolution), OCCUPIED, FREE)
+    )
+    walls = states_in_cells(blocked, located.origin, maze.cell_size, maze.walls.shape) != FREE
+    walls |= maze.walls & ~_largest_area(walls, maze)
+    walls[[0, -1]] = walls[:, [0, -1]] = True
+    walls.flags.writeable = False
+
+    # What both maps show, in squares that are about as wide as the pixels of the newer one.
+    squares = min(_MOST_SQUARES, max(1, round(maze.cell_size / newer.resolution)))
+    shown, built = (
+        states_in_cells(
+            _with_thick_walls(grid, options), located.origin, maze.cell_size / squares, (maze.size * squares,) * 2
+        )
+        for grid in (older, newer)
+    )
+    pair = compared(shown, built, maze.size, maze.cell_size, covered, pose)
+    hint = "" if is_aligned or covered * met >= LEAST_FIT else "; few walls lie on each other: try --align"
+    remark(f"{name}: {pair.describe(maze.name)}{hint}")
+    return OlderMap(walls, maze, pair)
+
+
+def _require_one_frame(older: OccupancyGrid, newer: OccupancyGrid, name: str, of: str) -> None:
+    """Raises `InputError` unless two maps have origins, or as many pixels."""
     wanted, found = (grid.frame or grid.states.shape for grid in (newer, older))
     if found != wanted:
         units = ("cells" if grid.is_cells else "pixels" for grid in (newer, older))
@@ -113,27 +131,15 @@ def lay_on(
             "a map with an origin" if each == "map" else "{1} x {0} {2}".format(*each, unit)
             for each, unit in zip((wanted, found), units, strict=True)
         )
-        raise InputError(f"{name}: expected an older map of {wanted}, as {maze.name} is, found {found}")
-    older_x, older_y, older_yaw = older.origin
-    if abs(math.remainder(yaw - older_yaw, math.tau)) > _TURN:
         raise InputError(
-            f"{name}: expected an older map that is turned by {yaw:g} rad, as {maze.name} is, found {older_yaw:g}"
+            f"{name}: expected an older map of {wanted}, as {of} is, found {found}; --align takes others, too"
         )
 
-    # Where cells begin, in pixels from the left and from the top of the older map, and where the last ones end.
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    right = cosine * (x - older_x) + sine * (y - older_y)
-    up = cosine * (y - older_y) - sine * (x - older_x)
-    edges = np.arange(maze.size + 1) * maze.cell_size
-    height, width = older.states.shape
-    columns = np.rint((right + edges) / older.resolution).astype(int)
-    rows = height - np.rint((up + edges[::-1]) / older.resolution).astype(int)
 
-    # Whether one of their pixels is wall; with wall around the map, so much that cells beyond its end reach into it.
-    walls = np.pad(blocked_pixels(older.states, options, older.resolution), (1, 2), constant_values=True)
-    walls = np.logical_or.reduceat(walls, np.clip(rows, -1, height + 1) + 1, axis=0)[:-1]
-    walls = np.logical_or.reduceat(walls, np.clip(columns, -1, width + 1) + 1, axis=1)[:, :-1]
-    return older_map(walls, maze, name)
+def _with_thick_walls(grid: OccupancyGrid, options: ReadOptions) -> OccupancyGrid:
+    """Returns a map whose walls are as thick as where a maze is read; what is unknown stays unknown."""
+    is_wall = blocked_pixels(grid.states, options, grid.resolution) & (grid.states != UNKNOWN)
+    return dataclasses.replace(grid, states=np.where(is_wall, OCCUPIED, grid.states))
 
 
 def _largest_area(walls: np.ndarray, maze: Maze) -> np.ndarray:

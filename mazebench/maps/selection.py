@@ -12,6 +12,7 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.older_map import OlderMap, lay_on, one_for_each
+from mazebench.maps.pair import pair_of_walls
 from mazebench.maps.readers.arrays import as_array, grid_of_array
 from mazebench.maps.readers.occupancy_grid import LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.text import format_maze, format_walls, parse_maze, parse_walls
@@ -33,10 +34,11 @@ def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
     )
 
 
-def texts_of(shown: Any, mazes: Any, options: ReadOptions) -> tuple[str, ...]:
+def texts_of(shown: Any, mazes: Any, options: ReadOptions, is_aligned: bool) -> tuple[str, ...]:
     """Returns older maps of mazes in the cells of the mazes, as texts, which `maps_in_texts` takes.
 
-    Both are given as `own_mazes` takes them; a single map is that of all mazes. Such texts stay as they are.
+    Both are given as `own_mazes` takes them; a single map is that of all mazes. Such texts stay as they are. Maps are
+    laid on the mazes as `lay_on` does.
 
     Raises:
       InputError: if something else is given, there are other numbers of them, or one is no older map of its maze.
@@ -45,7 +47,9 @@ def texts_of(shown: Any, mazes: Any, options: ReadOptions) -> tuple[str, ...]:
         return tuple(shown)
     newer, older = _items(mazes), [(item, f"shown {name}") for item, name in _items(shown)]
     return tuple(
-        format_walls(lay_on(_grid(old, name), _grid(new, of), _located(new, of, options), options, name).walls)
+        format_walls(
+            lay_on(_grid(old, name), _grid(new, of), _located(new, of, options), options, name, is_aligned).walls
+        )
         for (new, of), (old, name) in zip(newer, one_for_each(older, len(newer)), strict=True)
     )
 
@@ -59,7 +63,10 @@ def maps_in_texts(texts: Sequence[str], mazes: Sequence[Maze]) -> tuple[OlderMap
     walls = [parse_walls(text, "shown") for text in texts]
     if [each.shape for each in walls] != [maze.walls.shape for maze in mazes]:
         raise InputError("expected an older map in the cells of each maze, found others")
-    return tuple(OlderMap(each, maze) for each, maze in zip(walls, mazes, strict=True))
+    return tuple(
+        OlderMap(each, maze, pair_of_walls(each, maze.walls, maze.cell_size))
+        for each, maze in zip(walls, mazes, strict=True)
+    )
 
 
 def _grid(item: Any, name: str) -> OccupancyGrid:

@@ -134,6 +134,16 @@ class Provenance(_Stored):
     machine: dict[str, Any]
 
 
+class PairFigures(_Stored):
+    """The agreement of a maze with the older map that was shown of it, as `mazebench.maps.pair.Pair` has it."""
+
+    covered: Share
+    wall_now: Length  # m2, as the other two
+    free_now: Length
+    on_one_map: Length
+    pose: tuple[float, float, float] | None = None  # x, y (m), yaw (rad), if the option `align` found it
+
+
 class Summary(_Stored):
     """The result of one evaluation."""
 
@@ -149,6 +159,7 @@ class Summary(_Stored):
     provenance: Provenance
     overall: Figures
     by_distance: dict[str, Figures]
+    pairs: dict[Name, PairFigures] = {}  # by maze, of the older maps that were shown
     counts: dict[str, int] = {}  # sums of the whole numbers that the agent noted of episodes
     by_fact: dict[str, Figures] = {}  # of the groups that a track tells apart: "blocked", "not blocked", kinds of mazes
 

@@ -233,7 +233,7 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
     if asked.shown is None:
         mazes = read_mazes(mazes, asked.size, **dataclasses.asdict(asked.reading))
     else:
-        mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
+        mazes, shown = read_with_older(mazes, asked.shown, asked.reading, asked.align)
     kept = _playable(mazes, functools.partial(_check_maze, asked))
     return tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept)
 

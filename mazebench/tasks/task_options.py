@@ -107,6 +107,13 @@ class TaskOptions(AllSensorOptions, ReadOptions):
             "ROS maps are laid on each other by their origins; others must have one size."
         ),
     ] = None
+    align: Annotated[
+        bool,
+        Doc(
+            "Turns and moves the older map of shown to where its walls and its free space fit those of mazes, instead "
+            "of laying it by its origin. Refused where no place is better than chance."
+        ),
+    ] = False
     kinds: Annotated[
         tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
         Doc(
@@ -228,7 +235,7 @@ class TaskOptions(AllSensorOptions, ReadOptions):
             raise InputError("shown, an older map: expected a path beside the path of mazes, else values, as mazes are")
         if self.mazes is not None and not isinstance(self.mazes, str):
             if has_both:
-                object.__setattr__(self, "shown", texts_of(self.shown, self.mazes, self.reading))
+                object.__setattr__(self, "shown", texts_of(self.shown, self.mazes, self.reading, self.align))
             object.__setattr__(self, "mazes", own_mazes(self.mazes, self.reading))
         object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
         if self.track is not None and not self.sensors:
@@ -253,7 +260,7 @@ class TaskOptions(AllSensorOptions, ReadOptions):
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
         changed = self.changed()
-        left = {name for name in ("reward", "body", *CHOICES_OF_SENSORS) if name not in changed}
+        left = {name for name in ("reward", "body", "align", *CHOICES_OF_SENSORS) if name not in changed}
         values = {name: value for name, value in vars(self).items() if value is not None and name not in left}
         if self.mazes is not None:  # a path may have bytes that JSON has not
             own = self.mazes
@@ -371,6 +378,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
             raise InputError("expected mazes of your own or mazes that are drawn, found both")
         if self.shown is not None and self.mazes is None:
             raise InputError("shown, an older map: expected mazes of your own beside it, found none")
+        if self.align and self.shown is None:
+            raise InputError("align: expected shown, an older map, beside it, found none")
         if self.is_drawn and self.split == "eval":
             raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
         for name, found in options_in(self.changed(), ReadOptions).items():
