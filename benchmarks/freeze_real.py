@@ -110,8 +110,9 @@ def freeze_buildings(
         described: dict[str, Any] = {each: row[each] for each in ("split", "site", "use", "origin")}
         described["source"] = row["map"]
         if row["older"]:
-            options = ReadOptions(**{"align": True} if row["align"] else {})
-            (maze,), (older,) = read_with_older(path, maps / f"{row['older']}.yaml", options)
+            older_path, is_aligned = maps / f"{row['older']}.yaml", bool(row["align"])
+            (maze,), (older,) = read_with_older(path, older_path, ReadOptions(), is_aligned)
+            maze = dataclasses.replace(maze, name=name)
             built = [(YEARS, name, maze, older)]
         else:
             maze = dataclasses.replace(read_maze(path), name=name)
