@@ -21,7 +21,7 @@ from ..robot.driving import Drive
 from ..robot.map_matching import orientations
 from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.occupancy import SURE
-from ..robot.senses import Memory, Senses, report
+from ..robot.senses import Memory, Senses, range_sensor, report
 from .answer import Answer
 from .answers import Answers
 from .config import LLMConfig
@@ -100,6 +100,11 @@ class LLM(Agent):
     def build(cls, interface: Interface, *, config: Any = None, folder: Any = None, **others: Any) -> Self:
         """Returns an agent for the interface's mazes."""
         return cls(interface, config or cls.eval_config, folder)
+
+    @classmethod
+    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
+        """Returns the sensor of its ranges."""
+        return range_sensor(sensors)
 
     @classmethod
     def context_size(cls, size: int) -> int:

@@ -14,7 +14,7 @@ from ..robot.driving import Drive
 from ..robot.facing import TurningDrive
 from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.planning import plan
-from ..robot.senses import Memory, Senses, report
+from ..robot.senses import Memory, Senses, range_sensor, report
 
 
 @dataclasses.dataclass
@@ -45,6 +45,11 @@ class Navigator(Agent):
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
         """Returns an agent for the interface's mazes."""
         return cls(interface)
+
+    @classmethod
+    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
+        """Returns the sensor of its ranges."""
+        return range_sensor(sensors)
 
     @classmethod
     def context_size(cls, size: int) -> int:

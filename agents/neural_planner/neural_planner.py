@@ -24,7 +24,7 @@ from ..common.rollouts import RolloutLearner, Rows
 from ..imitation import ImitatingAgent, ImitationLearner
 from ..robot.motion import Motion, moved_in_the_open
 from ..robot.rays import ranges_to
-from ..robot.senses import Memory, Senses, report
+from ..robot.senses import Memory, Senses, range_sensor, report
 from .network import NUM_RANGES, REACH, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
 from .reward_learner import Choice, RewardLearner
@@ -71,6 +71,11 @@ class NeuralPlanner(ImitatingAgent):
     def make_network(cls, config: NeuralPlannerConfig, context_size: int) -> PlannerNetwork:
         """Returns a new network, which plans on grids of any size."""
         return PlannerNetwork(config.channels, config.hidden, config.ways)
+
+    @classmethod
+    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
+        """Returns the sensor of its ranges."""
+        return range_sensor(sensors)
 
     @staticmethod
     def learner_class(agent: NeuralPlanner, task: Task, seed: int) -> RolloutLearner:

@@ -156,6 +156,8 @@ def run_suite(
     for plan in plans.values():
         plan.check_workers(run.workers)
     plans = _playable(plans, out, suite)
+    for plan in plans.values():
+        plan.say_remarks(of_maps=False)
     with Pool(run.workers) as pool:
         make_folder(out)
         _prepare(out, suite, agents, seed, plans, run.resume)
