@@ -83,6 +83,7 @@ class LLM(Agent):
 
     plays_actions = PLAYED
     needs_shown = ("map", "goal")
+    read_sensors = staticmethod(range_sensor)
     eval_config: ClassVar[LLMConfig] = LLMConfig()
 
     def __init__(self, interface: Interface, config: LLMConfig, folder: pathlib.Path | None):
@@ -100,11 +101,6 @@ class LLM(Agent):
     def build(cls, interface: Interface, *, config: Any = None, folder: Any = None, **others: Any) -> Self:
         """Returns an agent for the interface's mazes."""
         return cls(interface, config or cls.eval_config, folder)
-
-    @classmethod
-    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
-        """Returns the sensor of its ranges."""
-        return range_sensor(sensors)
 
     @classmethod
     def context_size(cls, size: int) -> int:

@@ -34,6 +34,7 @@ class Navigator(Agent):
 
     plays_actions = PLAYED
     senses_class: ClassVar[type[Senses]] = Senses
+    read_sensors = staticmethod(range_sensor)
 
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""
@@ -45,11 +46,6 @@ class Navigator(Agent):
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
         """Returns an agent for the interface's mazes."""
         return cls(interface)
-
-    @classmethod
-    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
-        """Returns the sensor of its ranges."""
-        return range_sensor(sensors)
 
     @classmethod
     def context_size(cls, size: int) -> int:

@@ -62,6 +62,7 @@ class NeuralPlanner(ImitatingAgent):
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
     learns_several_tasks = True
+    read_sensors = staticmethod(range_sensor)
     config: NeuralPlannerConfig
     network: PlannerNetwork
     _senses: Senses
@@ -71,11 +72,6 @@ class NeuralPlanner(ImitatingAgent):
     def make_network(cls, config: NeuralPlannerConfig, context_size: int) -> PlannerNetwork:
         """Returns a new network, which plans on grids of any size."""
         return PlannerNetwork(config.channels, config.hidden, config.ways)
-
-    @classmethod
-    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
-        """Returns the sensor of its ranges."""
-        return range_sensor(sensors)
 
     @staticmethod
     def learner_class(agent: NeuralPlanner, task: Task, seed: int) -> RolloutLearner:
