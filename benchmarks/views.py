@@ -1,16 +1,21 @@
-"""A narrower view: the navigator with the lidar's rays that lie in a camera's view.
+"""Agents that see less: the navigator by the lidar's rays that lie in a camera's view, the map policy without pictures.
 
 mazebench eval --agent benchmarks.views:NarrowNavigator --track rebuilt --level 2 --split dev --actions velocity
+mazebench eval --agent benchmarks.views:GreyMapPolicy --track building --sensors egocentric --split dev
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from mazebench_agents.map_policy.map_policy import MapPolicy
 from mazebench_agents.navigator.navigator import Navigator
 from mazebench_agents.robot.senses import Senses
 
 from mazebench.agent import Inputs, Interface
 
+_GREY = 128  # of 255
 _AHEAD = 3  # rays on each side of the one straight ahead: 79 degrees
 
 
@@ -32,3 +37,12 @@ class NarrowNavigator(Navigator):
 
     needs_sensors = ("lidar",)
     senses_class = _NarrowSenses
+
+
+class GreyMapPolicy(MapPolicy):
+    """The map policy with pictures that are grey all over."""
+
+    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
+        """Returns actions `[B]`."""
+        grey = np.full_like(inputs.observation["egocentric"], _GREY)
+        return super().act(inputs._replace(observation=inputs.observation | {"egocentric": grey}), state, explore)

@@ -116,6 +116,11 @@ class _Declarations:
         return default_context_size(size)
 
     @classmethod
+    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
+        """Returns those of some sensors that the agent reads, here all; an evaluation names the others in a line."""
+        return sensors
+
+    @classmethod
     def default_checkpoint(cls) -> pathlib.Path | None:
         """Returns the file that `build` reads if it is given none; None if the agent reads no checkpoint."""
         return None
@@ -251,6 +256,7 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
         return declared
     # Named as the class that it wraps, for messages and provenance.
     declarations = ("eval_config", "needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
-    names = ("__module__", "__qualname__", "__doc__", *declarations, "context_size", "default_checkpoint")
+    methods = ("context_size", "read_sensors", "default_checkpoint")
+    names = ("__module__", "__qualname__", "__doc__", *declarations, *methods)
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

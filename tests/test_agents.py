@@ -316,6 +316,25 @@ class TestTracks:
         assert make_plan(eval_options("navigator", task="building")).remark is None
         assert make_plan(eval_options("random", task="rough")).remark is None
 
+    @pytest.mark.parametrize(
+        ("name", "options", "said"),
+        [
+            ("dqn", {"task": "building"}, []),
+            ("dqn", {"task": "building", "sensors": "lidar"}, []),
+            ("dqn", {"task": "building", "sensors": "lidar,egocentric"}, ["reads no sensors, found egocentric"]),
+            ("mah", {"sensors": "lidar,labels"}, ["reads no sensors, found lidar, labels"]),
+            ("planner", {"sensors": "depth"}, ["reads no sensors, found depth"]),
+            ("navigator", {"sensors": "egocentric"}, []),
+            ("navigator", {"sensors": "egocentric,lidar"}, ["reads lidar, found egocentric"]),
+            ("neural-planner", {"task": "rebuilt", "sensors": "egocentric,depth"}, ["reads egocentric, found depth"]),
+            ("map-policy", {"task": "building"}, []),
+            ("map-policy", {"sensors": "egocentric,labels"}, ["reads egocentric, found labels"]),
+        ],
+    )
+    def test_sensors_that_an_agent_does_not_read_are_said(self, name, options, said, remarks):
+        make_plan(eval_options(name, **options)).say_remarks(of_maps=False)
+        assert remarks() == [f"agent {name!r}: {each}" for each in said]
+
     @pytest.mark.parametrize("name", ALONE)
     @pytest.mark.parametrize(
         "options",

@@ -139,6 +139,12 @@ class TestOptions:
             ({"camera_size": 1281}, r"^expected camera_size from 1 to 1280, found 1281$"),
             ({"camera_fov": 361}, r"^expected camera_fov from 10 to 360, found 361$"),
             ({"look": "pretty"}, r"^unknown look 'pretty'; available: plain, varied$"),
+            ({"look": "varied"}, r"^look varied: expected the sensor egocentric, found none$"),
+            ({"look": "varied", "sensors": "depth"}, r"^look varied: expected the sensor egocentric, found depth$"),
+            (
+                {"task": "building", "camera_size": 32},
+                r"^camera_size 32: expected the sensor egocentric or depth or labels, found lidar$",
+            ),
         ],
     )
     def test_an_option_out_of_range_is_refused(self, options, message):
@@ -240,8 +246,9 @@ class TestLooks:
             {*np.ravel([look_of(maze, "varied", each).patterns for maze in mazes])} for each in (False, True)
         )
         assert (len(seen), len(unseen), len(seen & unseen)) == (8 + 3, 4 + 2, 0)
-        assert not Task.of(look="varied").options.is_unseen
-        assert resolve_for_evaluation(TaskOptions(look="varied")).options.is_unseen
+        options = {"sensors": "egocentric", "look": "varied"}
+        assert not Task.of(**options).options.is_unseen
+        assert resolve_for_evaluation(TaskOptions(**options)).options.is_unseen
 
     def test_equal_walls_look_equal(self):
         one, other = (generate("dfs", 13, np.random.default_rng(seed)) for seed in (0, 1))

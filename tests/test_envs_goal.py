@@ -48,6 +48,23 @@ class TestObservation:
         near, far = (env.reset(options={"episode": Episode(0, (1, 3), (1, c), 0.0, 0)})[0] for c in (4, 7))
         assert [key for key in near if not np.array_equal(near[key], far[key])] == ["desired_goal"]
 
+    def test_pictures_do_not_show_the_goal(self):
+        spec, episode = corridor_spec(sensors=("egocentric", "depth", "labels")), Episode(0, (1, 1), (1, 3), 0.0, 0)
+        (found, _), (shown, _) = (env(spec).reset(options={"episode": episode}) for env in (GoalMazeEnv, MazeEnv))
+        assert (set(np.unique(found["labels"])), set(np.unique(shown["labels"]))) == ({0, 1, 2}, {0, 1, 2, 3})
+        is_disc = shown["labels"] == 3
+        for name in ("egocentric", "depth"):
+            assert (found[name] == shown[name])[~is_disc].all()
+            assert (found[name] != shown[name])[is_disc].any()
+
+    def test_pictures_do_not_show_it_after_a_return_to_a_state_of_another_environment(self):
+        spec = corridor_spec(sensors="labels")
+        goal_env, env = GoalMazeEnv(spec), MazeEnv(spec)
+        for each in (goal_env, env):
+            each.reset(options={"episode": Episode(0, (1, 1), (1, 3), 0.0, 0)})
+        goal_env.set_state(env.get_state())
+        assert (goal_env.step(LOOK_LEFT)[0]["labels"] != 3).all()
+
     def test_goals_are_centres_of_cells(self):
         # The centre of cell (1, c) of 9 x 9 is (c + 0.5, 7.5).
         steps = drive(GoalMazeEnv(corridor_spec()), Episode(0, (1, 1), (1, 4), 0.0, 0), 6)

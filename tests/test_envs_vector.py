@@ -20,6 +20,7 @@ from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.rules import Names
 from mazebench.tasks.task import Task
 
 NUM_STEPS = 200
@@ -344,6 +345,24 @@ class TestArrays:
             expected, found = clean.step(action), dirty.step(action.copy())
             for one, other in zip(expected[1:4], found[1:4], strict=True):
                 np.testing.assert_array_equal(one, other)
+
+    def test_other_libraries_take_kinds_and_tracks_as_numbers(self):
+        torch = pytest.importorskip("torch")
+        _, infos = mazebench.make_vec(("building", "rough"), 4, seed=0).reset()
+        for name in ("kind", "track"):
+            numbers = torch.from_dlpack(infos[name])
+            assert [Names.NAMES[number] for number in numbers] == infos[name].tolist()
+        assert torch.from_dlpack(infos["track"] == "rough").tolist() == [name == "rough" for name in infos["track"]]
+
+    @pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+    def test_gymnasium_turns_them_into_tensors(self, mode):
+        pytest.importorskip("array_api_compat")
+        torch = pytest.importorskip("torch")
+        wrappers = pytest.importorskip("gymnasium.wrappers.vector")
+        envs = wrappers.NumpyToTorch(mazebench.make_vec("building", 2, autoreset_mode=mode))
+        observations, infos = envs.reset(seed=0)
+        *_, others = envs.step(torch.zeros(2, dtype=torch.int64))
+        assert all(isinstance(each, torch.Tensor) for part in (observations, infos, others) for each in part.values())
 
     def scribble(self, result: tuple) -> None:
         for part in result:

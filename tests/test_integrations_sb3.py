@@ -115,3 +115,22 @@ def test_ways_are_read_as_by_the_neural_planner():
     assert differ.sum() <= 8  # of 96 rays
     found.sum().backward()
     assert all(weight.grad.abs().sum() > 0 for weight in reader.planner.costs.parameters())
+
+
+@pytest.mark.parametrize("sensors", ["egocentric", "lidar,depth,labels"])
+@pytest.mark.parametrize("reader", [MapFeatures, WayFeatures, FieldVecEnv])
+def test_sensors_that_features_do_not_read_are_refused_by_name(reader, sensors):
+    envs = MazeVecEnv(mazebench.make_vec("building", 2, sensors=sensors))
+    found = sensors.removeprefix("lidar,").replace(",", ", ")
+    with pytest.raises(InputError, match=f"^{reader.__name__}: reads state, context, lidar, found {found}$"):
+        reader(envs if reader is FieldVecEnv else envs.observation_space)
+
+
+def test_a_method_acts_once_on_all_environments_and_not_on_some():
+    envs = MazeVecEnv(mazebench.make_vec("local", 3))
+    for indices in (None, [2, 0, 1]):
+        velocities = envs.env_method("velocity", indices=indices)
+        assert [each.shape for each in velocities] == [(3, 2)] * 3
+    for act in (envs.env_method, envs.set_attr):
+        with pytest.raises(InputError, match=r"^expected no indices, .*, found \[0\]$"):
+            act("draw_distances", [1], indices=[0])

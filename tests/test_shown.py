@@ -22,6 +22,8 @@ from mazebench.report.episodes import read_results
 from mazebench.results.played import played_task
 from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, goals_of, sample_episode
+from mazebench.tasks.perturbations.hand_drawing import HandDrawnMap, Line
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import default_time_limit
@@ -204,12 +206,23 @@ class TestMetres:
         assert len(trials) == 48
         assert {trial.distance for trial in trials} == set(range(15, 41))
 
-    def test_a_hand_bends_the_map_by_metres(self):
-        maze = house(cell_size=0.5)
-        spec = Task.of("rough", level=2, mazes=maze, shown=maze, distances=(8,))
-        drawing = show_map(spec, sample_episode(spec, np.random.default_rng(0))).drawing
-        moved = np.linalg.norm(drawing.displacement.at(maze.cell_size * (maze.free_cells + 0.5)), axis=1)
-        assert 0.5 < moved.max() < 1.01
+    @pytest.mark.parametrize(
+        ("share", "kind", "cells_of_a_door", "cell_size", "bend"),
+        [
+            (0.5, "house", 1, 1.0, 0.5),  # as on the track
+            (1.0, "house", 1, 0.4, 0.4),
+            (0.5, "", 1, 1.0, 0.5),
+            (1.0, "", 2, 0.5, 1.0),
+            (1.5, "", 2, 0.4, 1.2),
+            (1.5, "", 3, 0.4, 1.5),  # the most
+        ],
+    )
+    def test_a_hand_bends_the_map_by_a_share_of_the_width_of_doors(self, share, kind, cells_of_a_door, cell_size, bend):
+        walls = np.kron(house().walls, np.ones((cells_of_a_door, cells_of_a_door), dtype=bool))
+        shown = ShownMap(walls, kind=kind, cell_size=cell_size)
+        drawing = HandDrawnMap(share).shown(shown, ((1, 1), (1, 1)), np.random.default_rng(0)).drawing
+        moved = drawing.displacement.on_grid(Line(4 * len(walls) + 1, 4, cell_size=cell_size))
+        assert np.linalg.norm(moved, axis=0).max() == pytest.approx(bend, rel=0.005)
 
 
 class TestChangedBuildings:
@@ -225,6 +238,21 @@ class TestChangedBuildings:
         assert Task.of("adrift", level=2, mazes=plan).mazes == Task.of("rebuilt", level=2, mazes=plan).mazes
         assert spec.replace(level=2).mazes != spec.mazes
         assert Task.of("building", mazes=plan).mazes == (plan,)
+
+    @pytest.mark.parametrize("is_pair", [False, True])
+    def test_the_time_limit_follows_the_shortest_way_in_the_building_not_on_the_older_map(self, is_pair):
+        plan = house()
+        building = Task.of("rebuilt", level=3, mazes=plan).mazes[0]
+        own = {"mazes": building, "shown": plan} if is_pair else {"level": 3, "mazes": plan}
+        env = mazebench.make(Task.of("rebuilt", **own))
+        longer = 0
+        for seed in range(20):
+            env.reset(seed=seed)
+            episode, rules = env.unwrapped.runner.episode, env.unwrapped.runner.rules
+            way = env.unwrapped.task.mazes[episode.maze].distance(episode.start, episode.goal)
+            assert rules.time_limit.item() == 6 * way + 50
+            longer += plan.distance(episode.start, episode.goal) != way
+        assert longer
 
     def test_the_same_buildings_are_played_again(self, tmp_path):
         options = {"mazes": house(), "distances": (15,)}

@@ -82,6 +82,8 @@ def test_the_user_chooses_before_the_learner_does(tmp_path):
         ({"reward": "progress"}, "agent 'mah': computes the rewards of any goal itself, found reward 'progress'"),
         ({"task": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),
+        ({"task": "building", "sensors": "lidar,depth"}, "agent 'mah': reads no sensors, found depth"),
+        ({"look": "varied"}, "look varied: expected the sensor egocentric, found none"),
         ({"distances": 60}, "expected distances of at most "),
         ({"agent": "planner"}, "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, map-policy, mmn"),
         ({"overrides": {"colour": "red"}}, "unknown config key 'colour'"),

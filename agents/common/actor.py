@@ -89,6 +89,11 @@ class NetworkAgent(LearningAgent):
         return size
 
     @classmethod
+    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
+        """Returns those that it needs."""
+        return tuple(name for name in sensors if name in cls.needs_sensors)
+
+    @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
         """Returns the agent of a checkpoint, by default of the one that ships.
 

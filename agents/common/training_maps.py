@@ -57,14 +57,12 @@ def shows_other_maps(task: Task, agent: str) -> bool:
     """Returns whether the maps that `task` shows may be others than those of its mazes.
 
     Raises:
-      InputError: if the maps are drawn or lack marks, or a sensor or a reward is asked for, which the learner of
-        `agent` does not read.
+      InputError: if the maps are drawn or lack marks, or a reward is asked for, which the learner of `agent` does not
+        read.
     """
     name = f"agent {agent!r}"
     if task.options.reward != SPARSE:
         raise InputError(f"{name}: computes the rewards of any goal itself, found reward {task.options.reward!r}")
-    if task.options.track is None and task.options.sensors:
-        raise InputError(f"{name}: reads no sensors, found {', '.join(task.options.sensors)}")
     if task.options.track is None and not task.options.active_perturbations:
         return False
 

@@ -20,6 +20,7 @@ from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, STATE_SIZE, YAW
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
+from mazebench.tasks.sensors import LIDAR, unread
 
 from ..neural_planner.network import NUM_RANGES, REACH, CostPlanner, Situation, motion_features
 from ..neural_planner.neural_planner_config import NeuralPlannerConfig
@@ -27,6 +28,9 @@ from .distance_field import DistanceField
 
 if TYPE_CHECKING:
     from gymnasium import spaces
+
+
+_READ = ("state", "context", LIDAR)  # by all features below
 
 
 class MazeVecEnv(VecEnv):
@@ -78,18 +82,24 @@ class MazeVecEnv(VecEnv):
     def close(self) -> None:
         self.envs.close()
 
-    # The environments are one object, so all of them have its attributes.
+    # The environments are one object: all of them have its attributes, and its methods act on all.
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        self._require_all(indices)
         setattr(self.envs, attr_name, value)
 
     def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
-        return [getattr(self.envs, method_name)(*arguments, **options) for _ in self._get_indices(indices)]
+        self._require_all(indices)
+        return [getattr(self.envs, method_name)(*arguments, **options)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         return [False for _ in self._get_indices(indices)]
+
+    def _require_all(self, indices: Any) -> None:
+        if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
+            raise InputError(f"expected no indices, for the environments are one object, found {indices}")
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         return self.envs.render()
@@ -98,13 +108,17 @@ class MazeVecEnv(VecEnv):
 class FieldVecEnv(VecEnvWrapper):
     """Flat observations instead of those of a `MazeVecEnv`: the features of `DistanceField`, for "MlpPolicy".
 
-    >>> envs = FieldVecEnv(MazeVecEnv(mazebench.make_vec(("building", "rebuilt"), 64, reward="progress")))
-    >>> model = PPO("MlpPolicy", envs)
+        >>> envs = FieldVecEnv(MazeVecEnv(mazebench.make_vec(("building", "rebuilt"), 64, reward="progress")))
+        >>> model = PPO("MlpPolicy", envs)
+
+    Raises:
+      InputError: if there are sensors other than the lidar, which the features would leave out.
     """
 
     venv: MazeVecEnv
 
     def __init__(self, venv: MazeVecEnv):
+        _require_read("FieldVecEnv", venv.observation_space)
         self.field = DistanceField(venv.num_envs)
         spaces = venv.envs.single_observation_space.spaces  # type: ignore[attr-defined]  # a Dict
         size = self.field.num_features(spaces["lidar"].shape[0] if "lidar" in spaces else 0)
@@ -129,12 +143,16 @@ class MapFeatures(BaseFeaturesExtractor):
     """Convolutions of the context, and the state and the lidar, if there is one, in values of an order of 1.
 
     Without it, "MultiInputPolicy" flattens the context: float32 is no picture to Stable-Baselines3.
+
+    Raises:
+      InputError: if there are other observations.
     """
 
     scale: torch.Tensor  # [12], by which the state is multiplied
 
     def __init__(self, observation_space: spaces.Dict, num_features: int = 256):
         """`num_features` are those of the context."""
+        _require_read("MapFeatures", observation_space)
         lidar = observation_space.spaces.get("lidar")
         num_rays = 0 if lidar is None else lidar.shape[0]  # type: ignore[index]  # a Box has a shape
         super().__init__(observation_space, num_features + STATE_SIZE + num_rays)
@@ -160,9 +178,13 @@ class WayFeatures(BaseFeaturesExtractor):
 
     It has no memory, so the map is all that it plans on, beside the lidar's ranges to the walls that are near. It
     reads maps whose cells are 1 m wide.
+
+    Raises:
+      InputError: if there are sensors other than the lidar.
     """
 
     def __init__(self, observation_space: spaces.Dict):
+        _require_read("WayFeatures", observation_space)
         super().__init__(observation_space, CostPlanner.num_features)
         self.planner = CostPlanner(NeuralPlannerConfig.channels)
 
@@ -182,3 +204,9 @@ class WayFeatures(BaseFeaturesExtractor):
         motion = torch.from_numpy(motion_features(velocity, np.full((batch_size, 2), -1)))  # no last actions
         situation = Situation(state[:, [X, Y, YAW]], ranges, motion.to(state.device))
         return self.planner.features(plan, torch.arange(batch_size, device=state.device), situation)  # [B, features]
+
+
+def _require_read(features: str, observation_space: Any) -> None:
+    """Raises `InputError` if some of the observations are none that the features are of."""
+    if line := unread(features, observation_space.spaces, _READ):
+        raise InputError(line)

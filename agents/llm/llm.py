@@ -21,7 +21,7 @@ from ..robot.driving import Drive
 from ..robot.map_matching import orientations
 from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.occupancy import SURE
-from ..robot.senses import Memory, Senses, report
+from ..robot.senses import Memory, Senses, range_sensor, report
 from .answer import Answer
 from .answers import Answers
 from .config import LLMConfig
@@ -83,6 +83,7 @@ class LLM(Agent):
 
     plays_actions = PLAYED
     needs_shown = ("map", "goal")
+    read_sensors = staticmethod(range_sensor)
     eval_config: ClassVar[LLMConfig] = LLMConfig()
 
     def __init__(self, interface: Interface, config: LLMConfig, folder: pathlib.Path | None):

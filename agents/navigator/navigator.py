@@ -14,7 +14,7 @@ from ..robot.driving import Drive
 from ..robot.facing import TurningDrive
 from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.planning import plan
-from ..robot.senses import Memory, Senses, report
+from ..robot.senses import Memory, Senses, range_sensor, report
 
 
 @dataclasses.dataclass
@@ -34,6 +34,7 @@ class Navigator(Agent):
 
     plays_actions = PLAYED
     senses_class: ClassVar[type[Senses]] = Senses
+    read_sensors = staticmethod(range_sensor)
 
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""

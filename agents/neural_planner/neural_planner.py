@@ -24,7 +24,7 @@ from ..common.rollouts import RolloutLearner, Rows
 from ..imitation import ImitatingAgent, ImitationLearner
 from ..robot.motion import Motion, moved_in_the_open
 from ..robot.rays import ranges_to
-from ..robot.senses import Memory, Senses, report
+from ..robot.senses import Memory, Senses, range_sensor, report
 from .network import NUM_RANGES, REACH, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
 from .reward_learner import Choice, RewardLearner
@@ -62,6 +62,7 @@ class NeuralPlanner(ImitatingAgent):
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
     learns_several_tasks = True
+    read_sensors = staticmethod(range_sensor)
     config: NeuralPlannerConfig
     network: PlannerNetwork
     _senses: Senses

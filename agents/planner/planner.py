@@ -40,6 +40,11 @@ class MapPlanner(Agent):
         return cls(scale, interface.actions, interface.body)
 
     @classmethod
+    def read_sensors(cls, sensors: tuple[str, ...]) -> tuple[str, ...]:
+        """Returns none: it drives by the pose."""
+        return ()
+
+    @classmethod
     def context_size(cls, size: int) -> int:
         """Returns N: the map at full resolution, whose cells are waypoints."""
         return size

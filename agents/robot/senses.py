@@ -99,6 +99,11 @@ def report(memories: Iterable[Memory | None]) -> Report:
     return Report(np.array([(np.nan,) * 3 if each is None else each.pose_on_map for each in memories]))
 
 
+def range_sensor(sensors: tuple[str, ...]) -> tuple[str, ...]:
+    """Returns the one of some sensors from which a robot has ranges: the lidar, or the camera's pictures; or none."""
+    return tuple(name for name in ("lidar", "egocentric") if name in sensors)[:1]
+
+
 class Senses:
     """The senses of a robot in the environments of one interface, with their lidar or camera if they have one."""
 
@@ -112,9 +117,10 @@ class Senses:
         self._size, self._cell_size = interface.size, interface.cell_size
         self._body, self._odometry_noise = interface.body, interface.odometry_noise
         self._beams, self._camera = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size), None
-        self._has_ranges = "lidar" in interface.sensors
+        ranging = range_sensor(interface.sensors)
+        self._has_ranges = ranging == ("lidar",)
         self.feels, self.is_narrow = not self._has_ranges, False  # whether it also feels walls, and sees ahead only
-        if interface.camera is not None and "egocentric" in interface.sensors and not self._has_ranges:
+        if interface.camera is not None and ranging == ("egocentric",):
             from .camera_ranges import CameraRanges  # which needs PyTorch
 
             self._camera, self._has_ranges = CameraRanges(interface.camera, agent), True

@@ -32,11 +32,13 @@ class GoalMazeEnv(MazeEnv):
       the map around the start, the start), row by row.
     - achieved_goal: `[2]` float32: the centre (x, y) in m of the cell in which the body truly is.
     - desired_goal: `[2]` float32: the centre of the goal cell.
-    - what the `sensors` observe; cameras show the marker at the goal.
+    - what the `sensors` observe; in pictures there is no disc at the goal, which hindsight would leave where it was.
 
     `compute_reward`, `compute_terminated` and `compute_truncated` return what a step that led to `achieved_goal` gives
     if the goal is `desired_goal`. They take single goals and arrays of goals.
     """
+
+    _shows_goal = False
 
     def __init__(self, task: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         # A track may hide the body's position and has its own time limits, and the goals would tell what is hidden.

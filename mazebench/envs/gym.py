@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -28,6 +28,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
     """
 
     metadata = RENDERING
+    _shows_goal: ClassVar[bool] = True  # to the agent's cameras
 
     def __init__(self, task: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         """Opens the environment.
@@ -42,7 +43,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if an argument is not allowed.
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
-        self.runner = TaskRunner(task, seed)
+        self.runner = TaskRunner(task, seed, shows_goal=self._shows_goal)
         self.task = task
         walls = near_walls_of(task.mazes, 1, task.body)
         self.simulation = MujocoSimulation(walls.model, walls)

@@ -22,7 +22,7 @@ _Value = TypeVar("_Value")
 
 _RUNNING = np.ones(1, dtype=bool)
 _INDEX = np.zeros(1, dtype=np.int64)
-_NO_STATE = ("task", "_sensors")  # attributes of the rules that no step changes
+_NO_STATE = ("task", "_sensors", "_shows_goal")  # attributes of the rules that no step changes
 _SHARED = ("episodes", "shown", "_ways")  # attributes whose values never change
 
 
@@ -32,8 +32,8 @@ class TaskRunner:
     Its methods are those of a dm_control task. An environment calls them with the simulation that it steps.
     """
 
-    def __init__(self, task: Task, seed: int | None = None):
-        """`seed` is that of the stream from which episodes are drawn.
+    def __init__(self, task: Task, seed: int | None = None, *, shows_goal: bool = True):
+        """`seed` is that of the stream from which episodes are drawn; `shows_goal` says if cameras see the goal's disc.
 
         Raises:
           InputError: if `seed` is not a natural number, or `task` not a `Task`.
@@ -41,7 +41,7 @@ class TaskRunner:
         require_task(task)
         self.maze_task = task
         self._body, self._actions = task.body, Actions(task.actions, task.body)
-        self.rules = Rules(task, num_envs=1)
+        self.rules = Rules(task, num_envs=1, shows_goal=shows_goal)
         self.rng = np.random.default_rng()
         self._next_episode: Episode | None = None
         self.choose_episode(seed)

@@ -14,7 +14,8 @@ from mazebench.agent_loading import source_line
 from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, RunError, describe_error
 from mazebench.stopping import Stopped
-from mazebench.tasks.sensors import LIDAR
+from mazebench.tasks.sensors import LIDAR, unread
+from mazebench.tasks.task_options import TaskOptions
 
 
 class AgentError(RunError):
@@ -56,6 +57,17 @@ def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
 def sensors_of(agent_class: type[Agent], named: tuple[str, ...]) -> tuple[str, ...]:
     """Returns the sensors of an agent's task: those named, and those that it needs if only the lidar may be named."""
     return tuple(dict.fromkeys((*named, *agent_class.needs_sensors))) if named in ((), (LIDAR,)) else named
+
+
+def unread_sensors(name: str, agent_class: type[Agent], task: TaskOptions) -> str | None:
+    """Returns a line that names the sensors of a task that the agent `name` does not read; None if it reads all.
+
+    A track's own lidar is no sensor that was asked for.
+    """
+    own = () if task.track is None else (LIDAR,)
+    with calling(name, "read_sensors"):
+        read = agent_class.read_sensors(task.sensors)
+        return unread(f"agent {name!r}", [each for each in task.sensors if each not in own], read)
 
 
 class CheckedAgent(Agent):

@@ -21,7 +21,7 @@ from mazebench.agent import Observation
 from mazebench.agent_loading import load_agent_class
 from mazebench.envs.env_spec import env_spec_of
 from mazebench.envs.spaces import action_space, observation_space
-from mazebench.errors import InputError, RunError, remark
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
@@ -29,6 +29,7 @@ from mazebench.results.naming import described, title_of
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.rules import reward
+from mazebench.tasks.sensors import WITHOUT_SENSORS
 from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.trials import Trial
 
@@ -76,8 +77,7 @@ def collect_demonstrations(
         if folder.exists() and (found := sorted(path.name for path in folder.iterdir())):
             raise InputError(f"{folder}: expected a new or an empty folder, found {found[0]!r} in it")
         plan = make_plan(options, trials=(), resolver=resolve)
-        if plan.remark:
-            remark(plan.remark)
+        plan.say_remarks()
         shutil.rmtree(temporary, ignore_errors=True)
         folder.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -149,7 +149,7 @@ def _reference_scores(task: Task, trials: Mapping[int, Trial], seed: int) -> dic
     """Returns the mean returns of `random` and `oracle` in some trials, which Minari's normalized score has as 0, 1."""
     scores = {}
     for name, agent_name, actions in (("ref_min_score", "random", task.actions), ("ref_max_score", "oracle", "six")):
-        played = task.replace(actions=actions, sensors=(), lidar_noise=None)  # neither observes anything
+        played = task.replace(actions=actions, **WITHOUT_SENSORS)  # neither observes anything
         agent_class = load_agent_class(agent_name)
         agent = agent_class.build(played.interface, seed=seed)
         results = run_trials(agent, played, trials, len(trials), seed=seed, needs_truth=agent_class.needs_truth)

@@ -96,8 +96,7 @@ def run_evaluation(
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
     plan.check_workers(run.workers)
-    if plan.remark:
-        remark(plan.remark)
+    plan.say_remarks()
     if plan.provenance.agent_code_sha256 is None:
         remark(
             f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"

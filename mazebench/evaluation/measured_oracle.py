@@ -12,6 +12,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS
 from mazebench.evaluation.plan import Plan
 from mazebench.results.records import Record
+from mazebench.tasks.sensors import WITHOUT_SENSORS
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial
 
@@ -49,7 +50,7 @@ def measure_oracle_steps(task: Task, trials: Sequence[Trial], num_envs: int = NU
 def measure_steps_of_legs(task: Task, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> list[list[int | None]]:
     """Returns the oracle's steps to each goal of each trial, in one drive; None where it does not reach the goal."""
     # The oracle has the six actions and observes nothing; tracks have the lidar all the same.
-    task = task.replace(actions="six", sensors=(), lidar_noise=None)
+    task = task.replace(actions="six", **WITHOUT_SENSORS)
     agent = load_agent_class(_ORACLE).build(task.interface)
     steps: list[list[int | None]] = [[] for _ in trials]
     for results in run_trials(agent, task, dict(enumerate(trials)), num_envs, needs_truth=True):

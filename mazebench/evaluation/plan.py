@@ -13,8 +13,15 @@ from typing import Any
 from mazebench.agent import Agent, AgentConfig
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
-from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of, sensors_of
+from mazebench.errors import InputError, RunError, UnplayableError, remark
+from mazebench.evaluation.checked_agent import (
+    AgentError,
+    CheckedAgent,
+    calling,
+    context_size_of,
+    sensors_of,
+    unread_sensors,
+)
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
@@ -73,9 +80,16 @@ class Plan:
         if workers and config is not None and config.needs_one_process:
             raise InputError(f"agent {self.options.agent!r}: expected no --workers with this config, found {workers}")
 
+    def say_remarks(self, *, of_maps: bool = True) -> None:
+        """Warns of the sensors that the agent does not read and, with `of_maps`, of maps for which it is not made."""
+        unread = unread_sensors(self.options.agent, self.agent_class, self.task.options)
+        for line in (self.remark if of_maps else None, unread):
+            if line:
+                remark(line)
+
     @property
     def remark(self) -> str | None:
-        """A line of what a user should know before the evaluation; None if there is nothing."""
+        """A line of what a user should know of the maps before the evaluation; None if there is nothing."""
         task, agent, size = self.task, self.options.agent, _square(self.task.context_size)
         is_coarse = task.options.track is None and task.context_size < task.size
         way_out = "; context_size() of its class chooses another one (docs/custom_agents.md)" if is_coarse else ""

@@ -198,7 +198,9 @@ def run_suite(
     }
     left_out = _unplayable(plans, out, suite)
     chosen = [(folder, name) for folder in agent_of for name in parts if (folder, firsts[name]) not in left_out]
-    chosen = [key for key in chosen if key not in left_out]
+    for (folder, name), plan in plans.items():
+        if (folder, name) not in left_out:
+            plan.say_remarks(of_maps=False)
     with Pool(run.workers) as pool:
         make_folder(out)
         _prepare(out, suite, agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume)

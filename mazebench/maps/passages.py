@@ -7,6 +7,7 @@ building has the same passages whether it is drawn with cells of 1 m or with fou
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -61,6 +62,26 @@ def find_passages(walls: np.ndarray, cell_size: float) -> tuple[Passage, ...]:
                 box = (left, top, right, bottom) if turned else (top, left, bottom, right)
                 passages.append(Passage(*box, is_open=number < len(openings)))
     return tuple(passages)
+
+
+def door_width(walls: np.ndarray, cell_size: float) -> float:
+    """Returns the width of the doors of a building in metres: the lower quartile of its open passages, 1 without any.
+
+    Short corridors are passages, too, and wider than doors.
+    """
+    return _door_width(walls.tobytes(), cell_size)
+
+
+@functools.lru_cache(maxsize=32)
+def _door_width(cells: bytes, cell_size: float) -> float:
+    size = math.isqrt(len(cells))
+    walls = np.frombuffer(cells, dtype=bool).reshape(size, size)
+    widths = []
+    for top, left, bottom, right, is_open in find_passages(walls, cell_size):
+        if is_open:
+            has_sides = walls[top:bottom, left - 1].all() and walls[top:bottom, right].all()
+            widths.append(right - left if has_sides else bottom - top)
+    return float(np.quantile(widths, 0.25, method="lower")) * cell_size if widths else 1.0
 
 
 def _blocks(cells: np.ndarray) -> np.ndarray:

@@ -7,7 +7,9 @@ from typing import Any, overload
 
 import numpy as np
 
+from mazebench.maps.kinds import KINDS
 from mazebench.maps.maze import Cell
+from mazebench.maps.real_buildings import ORIGINS
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, episode_level
 from mazebench.tasks.observation import Noise, OpenSensors, state_errors
@@ -16,13 +18,29 @@ from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import PROGRESS
+from mazebench.tasks.tracks import TRACKS
 from mazebench.world.angles import wrap_angle
 
 _UNKNOWN = -1  # a way that would take long to measure
+_OUT_OF_SIGHT = 1e6  # m, where cameras do not see the goal's disc
 _INFOS = (  # what `Rules.infos` describes, in this order
     *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
     *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
 )
+
+
+class Names(np.ndarray):
+    """An array of kinds or tracks as text, which libraries that have no texts take by DLPack as their numbers.
+
+    The number is the index in `NAMES`, from 0 for "".
+    """
+
+    NAMES = ("", *KINDS, *ORIGINS, *TRACKS)
+
+    def __dlpack__(self, **options: Any) -> Any:
+        if self.dtype != object:  # what was computed of names
+            return super().__dlpack__(**options)
+        return np.array([self.NAMES.index(name) for name in self.flat]).reshape(self.shape).__dlpack__(**options)
 
 
 @overload
@@ -67,8 +85,9 @@ class Rules:
     entered on the last step is reached.
     """
 
-    def __init__(self, task: Task, num_envs: int, num_threads: int = 1):
+    def __init__(self, task: Task, num_envs: int, num_threads: int = 1, *, shows_goal: bool = True):
         self.task = task
+        self._shows_goal = shows_goal  # whether the agent's cameras see the goal's disc
         self._num_threads = num_threads  # of the sensors; 0 for all cores
         self._sensors = OpenSensors(task)
 
@@ -79,7 +98,8 @@ class Rules:
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._noise: list[Noise] = [self._sensors.begin(None)] * num_envs
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
-        self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", task.options.track or ""))
+        texts = "", task.options.track or ""
+        self.kind, self.track = (np.full(num_envs, text, dtype=object).view(Names) for text in texts)
         self.blocked = np.zeros(num_envs, dtype=bool)
         self._ways: list[np.ndarray | None] = [None] * num_envs  # [N * N] int, in cells from each cell to the goal
         self.active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
@@ -239,7 +259,8 @@ class Rules:
         observed = {"state": states.astype(np.float32)}
         if self.task.options.sensors:
             noise = [self._noise[i] for i in indices.tolist()]
-            worlds = self.maze[indices], self.pose[indices], self.marker[indices]
+            marker = self.marker[indices] if self._shows_goal else np.full((len(indices), 3), _OUT_OF_SIGHT)
+            worlds = self.maze[indices], self.pose[indices], marker
             observed |= self._sensors.read(*worlds, noise, self._num_threads)
         return observed
 
@@ -259,7 +280,7 @@ class Rules:
         - blocked: bool, whether a wall of the true maze stands in the shortest path on the shown map.
         - Of several goals, these three are of the present one.
         - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
-        - track: "" without one. level: of the track, 0 without one.
+        - track: "" without one. level: of the track, 0 without one. Kinds and tracks are `Names`.
         """
         values = vars(self) | {
             "success": self.reached,

@@ -17,7 +17,7 @@ from mazebench.tasks.context import default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.perturbations import OF_OPTION
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
-from mazebench.tasks.sensors import SENSORS
+from mazebench.tasks.sensors import SENSORS, require_sensors_of_options
 from mazebench.tasks.task_options import DRAWN_KINDS, HIERARCHICAL, LOCAL, NUM_DRAWN, TaskOptions
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS, cells_of
@@ -186,13 +186,14 @@ def resolve(
       arena: what it is played in, if that is there already.
 
     Raises:
-      InputError: if a map can't be read, or the task can't be played in a maze.
+      InputError: if a map can't be read, the task can't be played in a maze, or an option's sensor is not observed.
     """
     if isinstance(asked, Task):
         if context_size_of is None:
             return asked
         wanted = None if asked.options.track is not None else context_size_of(asked.size)
         return asked.replace(context_size=wanted)
+    require_sensors_of_options(asked.sensors, asked.changed().items())  # here, since agents add sensors of their own
     arena, body = arena or arena_of(asked), BODIES[asked.body]
     if arena.cell_size < 2 * body.reach:
         raise InputError(

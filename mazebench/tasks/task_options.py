@@ -396,10 +396,6 @@ class TaskOptions(AllSensorOptions, ReadOptions):
             self._require(f"num_goals {self.num_goals}", task=task, pairs="random", goal=None, reward=SPARSE)
         if self.num_ends:
             self._require("a start or a goal", pairs="random")
-        for noise, name in NOISE_OF_SENSORS.items():
-            if (value := getattr(self, noise)) is not None and name not in self.sensors:
-                found = ", ".join(self.sensors) or "none"
-                raise InputError(f"{noise} {value}: expected the sensor {name}, found {found}")
         if self.odometry_noise:
             self._require(f"odometry_noise {self.odometry_noise:g}", position_noise=0.0, exact_pose=False)
         if self.hide:

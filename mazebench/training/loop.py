@@ -22,7 +22,7 @@ import numpy as np
 from mazebench import stopping
 from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.checked_agent import context_size_of, sensors_of
+from mazebench.evaluation.checked_agent import context_size_of, sensors_of, unread_sensors
 from mazebench.evaluation.provenance import code_hash
 from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
@@ -325,6 +325,8 @@ def training_task(
     task = resolve(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
     if needed := [name for name in agent_class.needs_shown if name in task.options.hide]:
         raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")
+    if unread := unread_sensors(agent, agent_class, task.options):
+        raise InputError(unread)
     if task.cell_size != 1:
         raise InputError(f"expected mazes with cells of 1 m in a training, found {task.cell_size:g} m (--cell-size)")
     return task

@@ -1,6 +1,6 @@
 """A map as it is drawn by hand: a grey picture of 2 N x 2 N pixels.
 
-- A smooth displacement bends the maze.
+- A smooth displacement bends the maze, by a share of the width of its doors.
 - Each axis is scaled by uniform(0.85, 1.15), where 1.15 fills the picture. The drawing lies anywhere on the picture.
 - Walls are drawn up to a pixel thicker or thinner, where a cell is two pixels.
 - A pixel has the share of wall in it, to 8 bits. The paper around the maze is wall.
@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.maps.maze import Cell
+from mazebench.maps.passages import door_width
 from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
@@ -37,14 +38,16 @@ _WHITE = 255  # the largest of the grey values, which are multiples of 1 / 255
 class HandDrawnMap(Perturbation):
     """Draws the map by hand; the draws are the same for all bends."""
 
-    bend: float  # m, the largest displacement; at most LARGEST_BEND
+    bend: float  # the largest displacement, in widths of a door, and at most LARGEST_BEND
 
     stream = Stream.DRAWN_SHEET
     pixels_per_cell = PIXELS
 
     def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         size, cell_size = len(shown.walls), shown.cell_size
-        displacement = draw_displacement(size, rng, cell_size).scaled(self.bend)
+        # A drawn or frozen maze has doors of one cell, of 1 m on the tracks.
+        door = cell_size if shown.kind else door_width(shown.walls, cell_size)
+        displacement = draw_displacement(size, rng, cell_size).scaled(min(self.bend * door, LARGEST_BEND))
         stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)
         margin = rng.uniform(size=2)
         thickening = float(rng.uniform(-LARGEST_THICKENING, LARGEST_THICKENING))

@@ -65,6 +65,10 @@ class CameraSensor(Sensor[CameraOptions]):
     options = CameraOptions
 
     @classmethod
+    def options_of(cls, name: str) -> tuple[str, ...]:
+        return tuple(option for option in super().options_of(name) if option != "look" or name == "egocentric")
+
+    @classmethod
     def told(cls, options: CameraOptions) -> Mapping[str, Any]:
         return {"camera": options.camera}
 

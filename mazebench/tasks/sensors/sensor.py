@@ -11,7 +11,7 @@ import numpy as np
 from dm_env import specs
 
 from mazebench.maps.drawn import Mazes
-from mazebench.options import Options
+from mazebench.options import Options, fields_of
 from mazebench.tasks.streams import Stream
 
 
@@ -52,6 +52,11 @@ class Sensor(abc.ABC, Generic[OwnOptions]):
     noise: ClassVar[str | None] = None
 
     stream: Stream | None = None  # of an episode, from which noise is drawn; None if none is
+
+    @classmethod
+    def options_of(cls, name: str) -> tuple[str, ...]:
+        """Returns the options that make a difference to what the sensor called `name` observes, here all."""
+        return tuple(fields_of(cls.options))
 
     @classmethod
     def told(cls, options: OwnOptions) -> Mapping[str, Any]:
