@@ -207,7 +207,8 @@ def run_suite(
         counts = {key: len(plans.get(key, plans[key[0], firsts[key[1]]]).trials) for key in chosen}
         summaries, before, total = [], 0, sum(counts.values())
         for folder, name in chosen:
-            plan = plans.pop((folder, name), None) or planned(agent_of[folder], parts[name])
+            key = folder, name
+            plan = plans.pop(key) if key in plans else planned(agent_of[folder], parts[name])
             record = not is_finished(out / folder / name) if run.record is None else run.record
             summary = run_plan(
                 plan,
