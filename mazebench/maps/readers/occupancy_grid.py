@@ -87,7 +87,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     enclosed = [enclose(area.cells, 0 if grid.is_cells else MIN_SIZE) for area in areas]
     number, is_found = choose(areas, enclosed, options.area, cell_size)
     row, column, height, width, walls = enclosed[number]
-    size = len(walls)
+    size = max(height, width, len(walls))
     if size > MAX_SIZE:
         remedy = "save it as a ROS map, which is coarsened" if grid.is_cells else "give a larger cell_size"
         raise MazeError(f"{name}: expected at most {MAX_SIZE} cells a side, found {size} of {cell_size:g} m; {remedy}")
