@@ -1,11 +1,15 @@
 """Checkpoints: what is saved comes back; a damaged one or one of another agent is refused in one line."""
 
+import math
 import pathlib
 import pickle
+import tempfile
 
 import pytest
 import torch
-from mazebench_agents.common.checkpoint import load_checkpoint, save_checkpoint
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mazebench_agents.common.checkpoint import load_agent, load_checkpoint, save_checkpoint
 from mazebench_agents.dqn import DQN
 from mazebench_agents.mah import MAH
 
@@ -13,6 +17,7 @@ from mazebench.agent import Interface
 from mazebench.errors import InputError
 
 ROOT = pathlib.Path(__file__).parent.parent
+CHECKPOINT = ROOT / "assets" / "checkpoints" / "dqn-13.safetensors"
 INTERFACE = Interface("local", 13, 13)
 
 
@@ -66,6 +71,55 @@ def test_what_is_no_checkpoint_is_named(tmp_path, content, found):
     (tmp_path / "agent.safetensors").write_bytes(content)
     with pytest.raises(InputError, match=f"found {found}"):
         MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
+
+
+def set_first(values, dtype=torch.float32):
+    """Changes the first weights of a network."""
+
+    def change(tensors, metadata):
+        name = min(tensors)
+        tensors[name] = torch.full_like(tensors[name], values, dtype=dtype)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        (set_first(math.nan), "expected finite numbers in .*, found nan or inf"),
+        (set_first(-math.inf, torch.float16), "expected finite numbers in .*, found nan or inf"),
+        (set_first(1e300, torch.float64), "expected finite numbers in .*, found nan or inf"),
+        *((set_first(1, dtype), f"found {dtype}") for dtype in (torch.int32, torch.int64, torch.uint8, torch.bool)),
+        *(
+            (lambda tensors, metadata, size=size: metadata.update(context_size=size), "a context_size of 5 to 1024")
+            for size in (-3, 0, 10**9, "13", 13.0, True, None, math.nan, math.inf)
+        ),
+        (lambda tensors, metadata: tensors.update((f"x{n}", torch.zeros(0)) for n in range(10_001)), "at most 10,000"),
+    ],
+)
+def test_weights_and_sizes_that_no_network_has_are_refused(tmp_path, change, found):
+    tensors = MAH(MAH.default_config, 13).network.state_dict()
+    metadata = {"agent": "mah", "config": {}, "context_size": 13}
+    change(tensors, metadata)
+    save_checkpoint(tmp_path / "agent.safetensors", tensors, metadata)
+    with pytest.raises(InputError, match=found):
+        MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
+
+
+@given(st.data())
+@settings(max_examples=200, deadline=None)
+def test_a_checkpoint_cut_or_changed_anywhere_is_read_or_refused_in_one_line(data):
+    content = bytearray(CHECKPOINT.read_bytes())
+    for position in data.draw(st.lists(st.integers(0, 3000) | st.integers(0, len(content) - 1), max_size=3)):
+        content[position] = data.draw(st.integers(0, 255))
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "agent.safetensors"
+        path.write_bytes(content[: data.draw(st.integers(0, len(content)) | st.just(len(content)))])
+        try:
+            said = load_agent(path, "dqn", DQN.default_config)[2]
+        except InputError as error:
+            said = error
+    assert str(said).isprintable()
 
 
 def test_missing_checkpoint_is_refused(tmp_path):
