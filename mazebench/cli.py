@@ -12,7 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from mazebench import __version__
+from mazebench import __version__, stopping
 from mazebench.commands.bench import bench
 from mazebench.commands.collect import collect
 from mazebench.commands.compare import compare
@@ -64,7 +64,9 @@ def main() -> None:
             if not word or re.fullmatch(r"--[\w-]+=", word):  # an empty path would be the working directory
                 raise InputError(f"expected a value of {word.rstrip('=') or before}, found an empty one")
         with remarks_to(functools.cache(_print_line)):  # each only once
-            sys.exit(app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0)
+            status = app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0
+            stopping.finish()
+            sys.exit(status)
     except _ClickException as error:
         _fail(error.format_message().replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
     except InputError as error:

@@ -16,8 +16,8 @@ from mazebench.storage.files import open_file
 
 # What NumPy raises for an archive that is damaged, encrypted or packed in another way, and for the head of an array,
 # which it reads as Python.
-UNREADABLE = (OSError, EOFError, ValueError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error, struct.error)
-UNREADABLE += (SyntaxError, tokenize.TokenError, TypeError, LookupError, OverflowError)
+_BAD_HEAD = (SyntaxError, tokenize.TokenError, TypeError, LookupError, OverflowError, struct.error)
+UNREADABLE = (OSError, EOFError, ValueError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error, *_BAD_HEAD)
 _MAX_BYTES = 2**31  # that an archive may unpack to
 
 
