@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import importlib
 import io
@@ -72,6 +73,8 @@ def main() -> None:
     except InputError as error:
         _fail(str(error), 2)
     except OSError as error:
+        if error.errno == errno.EMFILE:
+            _fail("expected more open files than this process may have; raise the limit by `ulimit -n`", 2)
         if error.filename is None:  # as of the stream that output goes to
             _fail(f"can't write: {error.strerror or error}", 1)
         _fail(f"{error.filename}: {error.strerror or error}", 2)
