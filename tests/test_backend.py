@@ -66,13 +66,6 @@ for make in (
     assert said[0].startswith("can't open a rendering context, MUJOCO_GL=elg: ")
 
 
-@pytest.mark.skipif("osmesa" not in MISSING, reason="OSMesa is installed")
-def test_a_library_that_is_not_installed_is_named():
-    program = "import mazebench; mazebench.make('local')"
-    said = run_python("-c", program, status=1, variables={"MUJOCO_GL": "osmesa"}).stderr
-    assert "MUJOCO_GL=osmesa: the library OSMesa is not installed; " in said
-
-
 @pytest.mark.parametrize(
     ("variables", "cause"),
     [

@@ -73,37 +73,30 @@ def test_what_is_no_checkpoint_is_named(tmp_path, content, found):
         MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
 
 
-def set_first(values, dtype=torch.float32):
-    """Changes the first weights of a network."""
-
-    def change(tensors, metadata):
-        name = min(tensors)
-        tensors[name] = torch.full_like(tensors[name], values, dtype=dtype)
-
-    return change
+@pytest.mark.parametrize("size", [-3, 0, 10**9, "13", 13.0, True, None, math.nan, math.inf])
+def test_a_context_of_no_mazes_size_is_refused(tmp_path, size):
+    with pytest.raises(InputError, match="expected a context_size of 5 to 1024, found"):
+        MAH.build(INTERFACE, checkpoint=saved(tmp_path, context_size=size))
 
 
 @pytest.mark.parametrize(
-    ("change", "found"),
-    [
-        (set_first(math.nan), "expected finite numbers in .*, found nan or inf"),
-        (set_first(-math.inf, torch.float16), "expected finite numbers in .*, found nan or inf"),
-        (set_first(1e300, torch.float64), "expected finite numbers in .*, found nan or inf"),
-        *((set_first(1, dtype), f"found {dtype}") for dtype in (torch.int32, torch.int64, torch.uint8, torch.bool)),
-        *(
-            (lambda tensors, metadata, size=size: metadata.update(context_size=size), "a context_size of 5 to 1024")
-            for size in (-3, 0, 10**9, "13", 13.0, True, None, math.nan, math.inf)
-        ),
-        (lambda tensors, metadata: tensors.update((f"x{n}", torch.zeros(0)) for n in range(10_001)), "at most 10,000"),
-    ],
+    ("value", "dtype", "found"),
+    [(math.nan, "float32", "nan or inf"), (-math.inf, "float16", "nan or inf"), (1e300, "float64", "nan or inf")]
+    + [(1, dtype, f"torch.{dtype}") for dtype in ("int32", "int64", "uint8", "bool")],
 )
-def test_weights_and_sizes_that_no_network_has_are_refused(tmp_path, change, found):
-    tensors = MAH(MAH.default_config, 13).network.state_dict()
-    metadata = {"agent": "mah", "config": {}, "context_size": 13}
-    change(tensors, metadata)
+def test_weights_that_are_no_finite_floats_are_refused(tmp_path, value, dtype, found):
+    tensors, metadata = load_checkpoint(saved(tmp_path), "mah")
+    name = min(tensors)
+    tensors[name] = torch.full_like(tensors[name], value, dtype=getattr(torch, dtype))
     save_checkpoint(tmp_path / "agent.safetensors", tensors, metadata)
-    with pytest.raises(InputError, match=found):
+    with pytest.raises(InputError, match=f"in {name}, found {found}"):
         MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
+
+
+def test_very_many_tensors_are_refused_before_they_are_read(tmp_path):
+    save_checkpoint(tmp_path / "many", {f"x{number}": torch.zeros(0) for number in range(10_001)}, {"agent": "mah"})
+    with pytest.raises(InputError, match="expected a checkpoint of at most 10,000 tensors, found 10,001"):
+        MAH.build(INTERFACE, checkpoint=tmp_path / "many")
 
 
 @given(st.data())

@@ -170,7 +170,7 @@ def test_a_deep_picture_whose_white_is_not_certain_is_refused_with_its_shades(ma
     PIL.Image.fromarray(shades).save(tmp_path / "plan.tif")
     found = f"{shades.min():g} to {shades.max():g}".replace("+", ".")
     for options in ({}, {"pixel_size": 0.1}):
-        with pytest.raises(MazeError, match=f"of 16 or 32 bits, found {found}; save it with 8 bits"):
+        with pytest.raises(MazeError, match=f"found {found} in a picture of 16 or 32 bits; save it with 8 bits"):
             read_maze(tmp_path / "plan.tif", **options)
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import pathlib
 import struct
@@ -52,17 +53,18 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
       InputError: if the file can't be read or has more than 128 MiB.
       MazeError: if it is no picture, has too many pixels, or more than 8 bits of which only the lowest are used.
     """
-    content = read_at_most(path, _MAX_BYTES, "picture")
+    content, image, num_pages = read_at_most(path, _MAX_BYTES, "picture"), None, 1
     try:
         with warnings.catch_warnings(action="ignore"), PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as picture:
             found = f"{picture.width} x {picture.height}"
-            # As its head says, before they take memory.
-            image = _as_array(picture, content, str(path)) if picture.width * picture.height <= _MAX_PIXELS else None
-            num_pages = _num_pages(picture)
+            if picture.width * picture.height <= _MAX_PIXELS:  # as its head says, before they take memory
+                image = _as_array(picture, content, str(path))
+                with contextlib.suppress(*_DAMAGED):  # of pages after the first
+                    num_pages = getattr(picture, "n_frames", 1)
     except MazeError:
         raise
     except PIL.Image.DecompressionBombError:
-        image, found = None, "many more"
+        found = "many more"
     except _DAMAGED as error:
         kind = kind_of(content) or "a file of another kind"
         raise MazeError(
@@ -73,14 +75,6 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
     if num_pages > 1:
         remark(f"{path}: the first of {num_pages} pages is read; save another one as a picture of its own")
     return image
-
-
-def _num_pages(picture: PIL.Image.Image) -> int:
-    """Returns the number of pages or frames; 1 if those after the first can't be read."""
-    try:
-        return getattr(picture, "n_frames", 1)
-    except _DAMAGED:
-        return 1
 
 
 def _as_array(picture: PIL.ImageFile.ImageFile, content: bytes, name: str) -> np.ndarray:
@@ -103,13 +97,11 @@ def _as_array(picture: PIL.ImageFile.ImageFile, content: bytes, name: str) -> np
         image = np.asarray(upright.convert("RGBA" if has_opacity else "RGB"))
 
     # Which number is white is certain only if the lightest shade is near to it.
-    low, high = float(image.min()), float(image.max())
-    is_light = low >= 0 and _LEAST_WHITE * white <= high <= white
-    if is_deep and not has_opacity and not is_light and (low, high) != (0, 0):
-        raise MazeError(
-            f"{name}: expected shades up to {white} in a picture of 16 or 32 bits, found {low:g} to {high:g}; "
-            "save it with 8 bits"
-        )
+    if is_deep and not has_opacity and image.any():
+        low, high = float(image.min()), float(image.max())
+        if not (low >= 0 and _LEAST_WHITE * white <= high <= white):
+            found = f"{low:g} to {high:g} in a picture of 16 or 32 bits; save it with 8 bits"
+            raise MazeError(f"{name}: expected shades of which the lightest is near {white}, found {found}")
     image = image.astype(np.uint16 if white > 255 else np.uint8)
     if has_opacity and image.ndim == 2:  # one of the shades is transparent
         return np.dstack([image] * 3 + [np.where(image == upright.info["transparency"], 0, white).astype(image.dtype)])
