@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from mazebench import stopping as stopping  # first, for signals that arrive while the others are imported
 from mazebench.envs.registration import register_environments
 
 if TYPE_CHECKING:

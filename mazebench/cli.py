@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import importlib
 import io
@@ -12,7 +13,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from mazebench import __version__
+from mazebench import __version__, stopping
 from mazebench.commands.bench import bench
 from mazebench.commands.collect import collect
 from mazebench.commands.compare import compare
@@ -64,12 +65,16 @@ def main() -> None:
             if not word or re.fullmatch(r"--[\w-]+=", word):  # an empty path would be the working directory
                 raise InputError(f"expected a value of {word.rstrip('=') or before}, found an empty one")
         with remarks_to(functools.cache(_print_line)):  # each only once
-            sys.exit(app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0)
+            status = app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0
+            stopping.finish()
+            sys.exit(status)
     except _ClickException as error:
         _fail(error.format_message().replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
     except InputError as error:
         _fail(str(error), 2)
     except OSError as error:
+        if error.errno == errno.EMFILE:
+            _fail("expected more open files than this process may have; raise the limit by `ulimit -n`", 2)
         if error.filename is None:  # as of the stream that output goes to
             _fail(f"can't write: {error.strerror or error}", 1)
         _fail(f"{error.filename}: {error.strerror or error}", 2)

@@ -1,12 +1,13 @@
 """SIGINT and SIGTERM end a command with one line that says how to go on.
 
 The first signal ends a command where it is, but one that keeps its results at the next `check`: after the step or the
-chunk that runs. A second signal ends the process at once.
+chunk that runs. A second signal ends the process at once. While the command's modules are imported, the first does.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import shlex
 import signal
 import sys
@@ -35,7 +36,15 @@ def listening() -> Iterator[None]:
     finally:
         _asked = None
         for number, handler in before.items():
-            signal.signal(number, handler)
+            if signal.getsignal(number) != signal.SIG_IGN:  # `finish` was not called
+                signal.signal(number, handler)
+
+
+def finish() -> None:
+    """Has a command that is done end with its status, whatever signals arrive from here on."""
+    for number in _SIGNALS:
+        if signal.getsignal(number) is _handle:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _handle(number: int, frame: object) -> None:
@@ -74,10 +83,26 @@ def stoppable(how_to_go_on: Callable[[], tuple[str, ...]], waits: bool = False) 
     except (Stopped, Exception):
         if _asked is None:
             raise
-        kept, *options = how_to_go_on()
-        words = ["mazebench", *sys.argv[1:], *(option for option in options if option not in sys.argv)]
-        event = "interrupted" if _asked == signal.SIGINT else "terminated"
-        print(f"mazebench: {event}; {kept} with: {shlex.join(words)}", file=sys.stderr)
+        _say(_asked, *how_to_go_on())
         sys.exit(128 + _asked)
     finally:
         _waits = before
+
+
+def _say(number: int, kept: str, *options: str) -> None:
+    words = ["mazebench", *sys.argv[1:], *(option for option in options if option not in sys.argv)]
+    event = "interrupted" if number == signal.SIGINT else "terminated"
+    print(f"mazebench: {event}; {kept} with: {shlex.join(words)}", file=sys.stderr, flush=True)
+
+
+def _end_at_once(number: int, frame: object) -> None:
+    _say(number, "run it again")
+    os._exit(128 + number)
+
+
+# The command imports this module before any other. Elsewhere, importing it does nothing. `python -m mazebench` has its
+# own word in `sys.argv` only later.
+if [os.path.basename(word) for word in sys.orig_argv[-len(sys.argv) :][:1]] == ["mazebench"]:
+    for _number in _SIGNALS:
+        if signal.getsignal(_number) != signal.SIG_IGN:
+            signal.signal(_number, _end_at_once)

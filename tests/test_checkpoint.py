@@ -1,11 +1,15 @@
 """Checkpoints: what is saved comes back; a damaged one or one of another agent is refused in one line."""
 
+import math
 import pathlib
 import pickle
+import tempfile
 
 import pytest
 import torch
-from mazebench_agents.common.checkpoint import load_checkpoint, save_checkpoint
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mazebench_agents.common.checkpoint import load_agent, load_checkpoint, save_checkpoint
 from mazebench_agents.dqn import DQN
 from mazebench_agents.mah import MAH
 
@@ -13,6 +17,7 @@ from mazebench.agent import Interface
 from mazebench.errors import InputError
 
 ROOT = pathlib.Path(__file__).parent.parent
+CHECKPOINT = ROOT / "assets" / "checkpoints" / "dqn-13.safetensors"
 INTERFACE = Interface("local", 13, 13)
 
 
@@ -66,6 +71,48 @@ def test_what_is_no_checkpoint_is_named(tmp_path, content, found):
     (tmp_path / "agent.safetensors").write_bytes(content)
     with pytest.raises(InputError, match=f"found {found}"):
         MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
+
+
+@pytest.mark.parametrize("size", [-3, 0, 10**9, "13", 13.0, True, None, math.nan, math.inf])
+def test_a_context_of_no_mazes_size_is_refused(tmp_path, size):
+    with pytest.raises(InputError, match="expected a context_size of 5 to 1024, found"):
+        MAH.build(INTERFACE, checkpoint=saved(tmp_path, context_size=size))
+
+
+@pytest.mark.parametrize(
+    ("value", "dtype", "found"),
+    [(math.nan, "float32", "nan or inf"), (-math.inf, "float16", "nan or inf"), (1e300, "float64", "nan or inf")]
+    + [(1, dtype, f"torch.{dtype}") for dtype in ("int32", "int64", "uint8", "bool")],
+)
+def test_weights_that_are_no_finite_floats_are_refused(tmp_path, value, dtype, found):
+    tensors, metadata = load_checkpoint(saved(tmp_path), "mah")
+    name = min(tensors)
+    tensors[name] = torch.full_like(tensors[name], value, dtype=getattr(torch, dtype))
+    save_checkpoint(tmp_path / "agent.safetensors", tensors, metadata)
+    with pytest.raises(InputError, match=f"in {name}, found {found}"):
+        MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
+
+
+def test_very_many_tensors_are_refused_before_they_are_read(tmp_path):
+    save_checkpoint(tmp_path / "many", {f"x{number}": torch.zeros(0) for number in range(10_001)}, {"agent": "mah"})
+    with pytest.raises(InputError, match="expected a checkpoint of at most 10,000 tensors, found 10,001"):
+        MAH.build(INTERFACE, checkpoint=tmp_path / "many")
+
+
+@given(st.data())
+@settings(max_examples=200, deadline=None)
+def test_a_checkpoint_cut_or_changed_anywhere_is_read_or_refused_in_one_line(data):
+    content = bytearray(CHECKPOINT.read_bytes())
+    for position in data.draw(st.lists(st.integers(0, 3000) | st.integers(0, len(content) - 1), max_size=3)):
+        content[position] = data.draw(st.integers(0, 255))
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "agent.safetensors"
+        path.write_bytes(content[: data.draw(st.integers(0, len(content)) | st.just(len(content)))])
+        try:
+            said = load_agent(path, "dqn", DQN.default_config)[2]
+        except InputError as error:
+            said = error
+    assert str(said).isprintable()
 
 
 def test_missing_checkpoint_is_refused(tmp_path):

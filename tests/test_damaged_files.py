@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import os
 import pathlib
 import pickle
 import shutil
 import sys
+import tempfile
+import warnings
 
+import numpy as np
+import PIL.Image
 import pytest
 from faults import TRAIN, said
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mazebench import cli
+from mazebench.errors import InputError, Remark
+from mazebench.maps.kinds import generate
+from mazebench.maps.maze_files import read_maze
+from mazebench.maps.pictures import draw_maze
+from mazebench.maps.readers.ros import write_ros_map
 
 EVAL = ["eval", "--agent", "random", "--distances", "1", "--episodes-per-distance", "1"]
 LEARN = [*TRAIN, "--env-steps", "800"]
@@ -77,6 +89,43 @@ def folders(tmp_path_factory) -> dict[str, pathlib.Path]:
         (top / name).mkdir()
         (top / name / file).write_bytes(content)
     return {folder.name: folder for folder in top.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def maps(tmp_path_factory) -> pathlib.Path:
+    """A folder with one maze as a file of each kind that is read as a map."""
+    folder = tmp_path_factory.mktemp("maps")
+    maze = generate("dfs", 13, np.random.default_rng(0))
+    for suffix in ("png", "jpg", "webp", "gif", "ppm", "bmp", "noname"):
+        PIL.Image.fromarray(draw_maze(maze, 4)).save(folder / f"plan.{suffix}", "PNG" if suffix == "noname" else None)
+    np.save(folder / "walls.npy", maze.walls)
+    np.save(folder / "letters.npy", np.where(maze.walls, "#", "."))
+    np.savez(folder / "stored.npz", maze.walls)
+    np.savez_compressed(folder / "packed.npz", maze.walls)
+    (folder / "rows.json").write_text(json.dumps(maze.walls.tolist()))
+    (folder / "grid.json").write_text(json.dumps({"grid": maze.walls.astype(int).tolist()}))
+    write_ros_map(maze, folder / "map.yaml")
+    return folder
+
+
+@given(st.data())
+@settings(max_examples=200, deadline=None)
+def test_a_map_cut_or_changed_anywhere_is_read_or_refused_in_one_line(maps, data):
+    with tempfile.TemporaryDirectory() as name:
+        folder, original = pathlib.Path(name), data.draw(st.sampled_from(sorted(maps.iterdir())))
+        path, content = folder / original.name, bytearray(original.read_bytes())
+        if path.suffix == ".pgm":
+            shutil.copy(maps / "map.yaml", folder)
+        for position in data.draw(st.lists(st.integers(0, len(content) - 1) | st.integers(0, 99), max_size=3)):
+            content[position] = data.draw(st.integers(0, 255))
+        path.write_bytes(content[: data.draw(st.integers(0, len(content)) | st.just(len(content)))])
+        with warnings.catch_warnings(action="error"), np.errstate(all="raise"):
+            warnings.simplefilter("ignore", Remark)
+            try:
+                said = read_maze(path if path.suffix != ".pgm" else folder / "map.yaml").name
+            except InputError as error:
+                said = str(error)
+        assert said.isprintable()
 
 
 CHECKPOINT = "checkpoints/000000000800"

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import pathlib
+import re
 import select
 import shutil
 import socket
@@ -17,9 +18,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from made_results import edit_summary, make_result, read_summary
 
+from mazebench.errors import InputError
 from mazebench.report import leaderboard
 from mazebench.report.table import make_values
 from mazebench.report.tables import Table
+from mazebench.results.reading import EPISODES, SUMMARY, load_result
 from mazebench.results.records import Summary
 
 SECRET = "victims-secret-1234567890"
@@ -166,6 +169,28 @@ class TestNames:
                 text = path.read_text()
                 assert not {"\x1b", "\u202e", "\u2066"} & set(text)
                 assert not any(cell.startswith("=") for line in text.splitlines() for cell in line.split(","))
+
+    def test_a_result_with_any_text_in_any_place_or_cut_is_read_or_refused_in_one_line(self, tmp_path):
+        folder = make_result(tmp_path / "x", "x", num_mazes=1, record=False)
+        whole = {name: (folder / name).read_bytes() for name in (SUMMARY, EPISODES)}
+
+        @QUICK
+        @given(st.sampled_from(sorted(whole)), st.text(st.characters(), max_size=20), st.data())
+        def check(file, text, data):
+            place = data.draw(st.sampled_from([match.span() for match in re.finditer(rb'"[^"]*"', whole[file])]))
+            content = whole[file][: place[0]] + json.dumps(text).encode() + whole[file][place[1] :]
+            for name in whole:
+                (folder / name).write_bytes(content if name == file else whole[name])
+            if data.draw(st.booleans()):
+                (folder / file).write_bytes(content[: data.draw(st.integers(0, len(content)))])
+            try:
+                result = load_result(folder)
+                said = result.summary.who + "".join(record.maze + record.split for record in result.records)
+            except InputError as error:
+                said = str(error)
+            assert said.isprintable()
+
+        check()
 
     def test_any_name_prints_and_is_no_formula(self, tmp_path):
         summary = read_summary(make_result(tmp_path / "x", "x", num_mazes=1, record=False))

@@ -55,6 +55,17 @@ class TestArea:
         assert "66 m2 with cell 1,1" in remarks()[0]
         assert len(locate_maze(grid_of(GROUNDS), ReadOptions(area="1,1"), "map").maze.free_cells) == 66
 
+    @pytest.mark.parametrize("shape", [(3, 60_000), (200_000, 1), (1, 5_000_000)])
+    def test_a_thin_grid_is_refused_before_it_is_made_square(self, shape):
+        with pytest.raises(MazeError, match=f"at most 1024 cells a side, found {max(shape) + 2} of 1 m; save it as"):
+            locate_maze(OccupancyGrid(np.full(shape, FREE, np.int8), is_cells=True), ReadOptions(), "map")
+
+    def test_an_area_too_large_for_a_maze_is_only_listed(self, remarks):
+        states = np.full((41, 2000), OCCUPIED, np.int8)
+        states[1:30, 1:30] = states[-1] = FREE  # a room, and a hall of more cells
+        maze, _ = locate_maze(OccupancyGrid(states, is_cells=True), ReadOptions(area="1,1"), "map")
+        assert len(maze.free_cells) == 29 * 29
+
     def test_a_place_in_no_area_is_said(self, remarks):
         locate_maze(grid_of(TWO_WINGS), ReadOptions(area="0,0"), "map")
         assert "; none has 0,0; " in remarks()[0]

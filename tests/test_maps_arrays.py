@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import mazebench
-from mazebench.errors import InputError
+from mazebench.errors import InputError, Remark
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.readers.arrays import maze_from_array
 
-WALLS = generate("dfs", 7, np.random.default_rng(0)).walls
+# What grids may hold, each as the values of its type.
+POOLS = [np.array(values) for values in ([False, True], [0, 1], [-1, 0, 1], [0.0, 1, np.nan], [0, 1 - 1e-12], [np.inf])]
+POOLS += [
+    np.array(values) for values in (["#", "."], ["", "#", "\ud800", "\n"], [b"#", b"\xe9"], ["##"], [1j], [2**63])
+]
+POOLS += [np.array([-1, 0, 40, 100]).astype(kind) for kind in ("i1", ">i4", "u1", "f2", ">f8", "m8[s]", object)]
+SHAPES = st.lists(st.integers(0, 12), max_size=3) | st.sampled_from([[1, 5000], [3, 1100], [5000, 3]])
+WALLS = generateWALLS = generate("dfs", 7, np.random.default_rng(0)).walls
 
 
 class TestWalls:
@@ -36,6 +47,9 @@ class TestWalls:
         ("array", "message"),
         [
             (np.zeros(5), "expected a two-dimensional array of numbers, found shape (5,) float64"),
+            (np.where(WALLS, 1 - 1e-12, 0), "found float64 with the values 0.0, 0.999999999999; "),
+            (np.zeros((3, 60_000)), "expected at most 1024 cells a side, found 3 x 60000"),
+            (np.frombuffer(b"\xff" * 100, "<U1").reshape(5, 5), "expected a two-dimensional array of numbers"),
             (np.full((5, 5), "##"), "expected a two-dimensional array of numbers, found shape (5, 5) <U2"),
             (
                 np.full((5, 5), 0.5),
@@ -49,6 +63,23 @@ class TestWalls:
         with pytest.raises(MazeError) as caught:
             maze_from_array(array)
         assert message in str(caught.value)
+
+    def test_characters_are_those_of_text_as_bytes_too(self):
+        assert maze_from_array(np.where(WALLS, b"#", b".")) == maze_from_array(np.where(WALLS, "#", ".")) == Maze(WALLS)
+
+    @given(st.sampled_from(POOLS), SHAPES, st.integers(0, 2**32 - 1), st.booleans())
+    @settings(max_examples=200, deadline=None)
+    def test_any_grid_is_a_maze_or_refused_in_one_line(self, pool, shape, seed, is_masked):
+        rng = np.random.default_rng(seed)
+        array = rng.choice(pool, shape)
+        array = np.ma.array(array, mask=rng.random(shape) < 0.2) if is_masked else array
+        with warnings.catch_warnings(action="error"), np.errstate(all="raise"):
+            warnings.simplefilter("ignore", Remark)
+            try:
+                said = str(maze_from_array(array).size)
+            except InputError as error:
+                said = str(error)
+        assert said.isprintable()
 
 
 class TestOccupancy:
@@ -107,6 +138,14 @@ class TestFile:
         assert mazebench.read_maze(tmp_path / "plan.npz") == Maze(WALLS)
         np.savez(tmp_path / "plan.npz", walls=WALLS, other=WALLS)
         with pytest.raises(InputError, match=r"with one array, found 2: walls, other; save one as \.npy"):
+            mazebench.read_maze(tmp_path / "plan.npz")
+
+    @pytest.mark.parametrize("shape", [(3, 60_000), (120, 2**20), (9000, 9000)])
+    def test_an_archive_takes_no_more_memory_than_a_maze_may(self, shape, tmp_path):
+        np.savez_compressed(tmp_path / "plan.npz", np.zeros(shape, np.uint8))
+        with pytest.raises(
+            InputError, match=r"at most 1024 cells a side, found 3 x 60000|at most 33554432 bytes when unpacked"
+        ):
             mazebench.read_maze(tmp_path / "plan.npz")
 
     def test_a_pickle_is_refused(self, tmp_path):

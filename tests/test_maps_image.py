@@ -1,13 +1,16 @@
 """Pictures of mazes: exact drawings, synthetic scans and files from outside."""
 
+import io
 import pathlib
 import struct
 import tempfile
+import warnings
 import zlib
 
 import cv2
 import hypothesis
 import numpy as np
+import PIL.Image
 import pytest
 from hypothesis import strategies as st
 
@@ -100,6 +103,82 @@ def test_map_is_read_when_pixels_are_gray_deep_or_transparent(maze):
     for image in (gray, deep, np.dstack([deep] * 3), transparent, transparent.astype(np.uint16) * 257):
         assert maze_from_image(image) == maze
         assert read_bytes(encode(image)) == maze
+
+
+@pytest.mark.parametrize(
+    ("format", "mode"),
+    [("PNG", "RGBA"), ("PNG", "LA"), ("WEBP", "RGBA"), ("TIFF", "RGBA"), ("TIFF", "LA"), ("GIF", "RGBA")],
+)
+def test_opacity_counts_in_every_format_that_has_it(maze, tmp_path, format, mode):
+    transparent = np.zeros((52, 52, 4), dtype=np.uint8)  # black everywhere, the floor seen through
+    transparent[..., 3] = 255 - blocks(maze.walls, 4)
+    kept = {"lossless": True, "exact": True} if format == "WEBP" else {}
+    PIL.Image.fromarray(transparent).convert(mode).save(tmp_path / "plan.png", format, **kept)
+    assert read_maze(tmp_path / "plan.png") == maze
+
+
+def test_a_shade_that_is_transparent_is_floor_at_any_depth(maze):
+    for shades, bits in ((blocks(maze.walls, 4) // 5, np.uint8), (np.where(blocks(maze.walls, 4), 77, 0), np.uint16)):
+        file = io.BytesIO()
+        PIL.Image.fromarray(shades.astype(bits)).save(file, "PNG", transparency=int(shades.max()))
+        assert read_bytes(file.getvalue()) == maze
+
+
+@pytest.mark.parametrize(
+    ("name", "format"), [("plan", "PNG"), ("plan.jfif", "JPEG"), ("plan.x", "TIFF"), ("p.txt", "PPM")]
+)
+def test_a_picture_is_read_whatever_its_suffix(maze, tmp_path, name, format):
+    PIL.Image.fromarray(draw_maze(maze, 8)).save(tmp_path / name, format)
+    assert read_maze(tmp_path / name) == maze
+
+
+@pytest.mark.parametrize(
+    ("head", "pixels"),
+    [
+        (b"P5\r\n52 52\r\n255\r\n", lambda gray: gray),
+        (b"P5\r\n# drawn\r\n52 52\r\n65535\r\n", lambda gray: gray.astype(">u2") * 257),
+        (b"P6\r\n52 52\r\n255\r\n", lambda gray: np.dstack([gray] * 3)),
+        (b"P4\r\n52 52\r\n", lambda gray: np.packbits(gray == 0, axis=1)),
+    ],
+)
+def test_line_ends_of_windows_in_a_head_shift_no_pixel(maze, head, pixels):
+    data = pixels(blocks(maze.walls, 4)).tobytes()
+    assert read_bytes(head + data) == read_bytes(head.replace(b"\r", b"") + data) == maze
+    with pytest.raises(MazeError, match="found a picture that is damaged"):
+        read_bytes(head + data[:-1])
+
+
+@pytest.mark.parametrize("format", ["TIFF", "WEBP", "PNG", "GIF"])
+def test_the_first_of_several_pages_is_read_and_a_line_says_so(maze, tmp_path, format, remarks):
+    first, other = PIL.Image.fromarray(draw_maze(maze, 4)), PIL.Image.fromarray(255 - draw_maze(maze, 4))
+    kept = {"lossless": True} if format == "WEBP" else {}
+    first.save(tmp_path / "plan.png", format, save_all=True, append_images=[other], **kept)
+    assert read_maze(tmp_path / "plan.png") == maze
+    assert [line.partition(": ")[2][:19] for line in remarks()] == ["the first of 2 page"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "white"),
+    [
+        *(("uint16", white) for white in (1, 255, 4095)),
+        *(("int32", white) for white in (255, 2**30, -1)),
+        *(("float32", white) for white in (1, 65535, np.nan)),
+    ],
+)
+def test_a_deep_picture_whose_white_is_not_certain_is_refused_with_its_shades(maze, tmp_path, kind, white):
+    shades = np.where(blocks(maze.walls, 4), white, 0).astype(kind)
+    PIL.Image.fromarray(shades).save(tmp_path / "plan.tif")
+    found = f"{shades.min():g} to {shades.max():g}".replace("+", ".")
+    for options in ({}, {"pixel_size": 0.1}):
+        with pytest.raises(MazeError, match=f"found {found} in a picture of 16 or 32 bits; save it with 8 bits"):
+            read_maze(tmp_path / "plan.tif", **options)
+
+
+@pytest.mark.parametrize("shade", [0, 130, 255, (255, 255, 255), (255, 0, 0), (0, 0, 255)])
+def test_a_picture_of_one_colour_is_refused_in_a_line_alone(shade):
+    image = np.full((64, 64, *np.shape(shade)), shade, dtype=np.uint8)
+    with warnings.catch_warnings(action="error"), np.errstate(all="raise"), pytest.raises(MazeError, match=NOT_READ):
+        maze_from_image(image, name="m")
 
 
 def rectangle(rows: int, columns: int, num_bars: int, rng: np.random.Generator) -> np.ndarray:

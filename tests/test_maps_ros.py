@@ -375,10 +375,10 @@ class TestRefusal:
         [
             ("", "expected the YAML file of a ROS map, with keys such as image and resolution, found an empty file"),
             ("hello", "with keys such as image and resolution, found no keys but 'hello'"),
-            ("image: map.pgm", "with resolution (the side of a pixel, above 0 m), found only image"),
-            (
-                yaml.safe_dump(METADATA | {"resolution": 0}),
-                "with resolution (the side of a pixel, above 0 m), found 0",
+            ("image: map.pgm", "with resolution (the side of a pixel, 0.001 to 100 m), found only image"),
+            *(
+                (yaml.safe_dump(METADATA | {"resolution": side}), f"pixel, 0.001 to 100 m), found {side}")
+                for side in (0, -1.0, 1e-300, 1e-4, 101.0, 1e300, float("inf"), float("nan"))
             ),
             (yaml.safe_dump(METADATA | {"origin": [0, 0]}), "origin (three finite numbers, [x, y, yaw]), found [0, 0]"),
             (yaml.safe_dump(METADATA | {"origin": [0.0, float("inf"), 0.0]}), "found [0.0, inf, 0.0]"),
@@ -397,6 +397,11 @@ class TestRefusal:
         with pytest.raises(InputError) as caught:
             read_maze(tmp_path / "map.yaml")
         assert message.replace("{folder}", str(tmp_path)) in str(caught.value)
+
+    def test_a_cell_larger_than_the_map_takes_no_memory(self, tmp_path):
+        path = write_map(tmp_path, drawn("##### #...# #...# #...# #####"), resolution=0.001)
+        with pytest.raises(MazeError, match="expected a free cell of 100 m, found none"):
+            read_maze(path, cell_size=100)
 
     def test_a_picture_in_a_folder_is_no_maze_of_its_own_however_it_is_named(self, tmp_path, monkeypatch):
         path = write_map(tmp_path, drawn("##### #...# #...# #...# #####"), image="plan.png")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import subprocess
@@ -166,6 +167,16 @@ class TestFullDisk:
         assert errors.startswith(f"mazebench: {film}: can't write")
         assert sorted(path.name for path in disk.path.iterdir()) == ["filler", film.name]
         assert film.read_bytes() == b"an earlier film"
+
+
+class TestFewOpenFiles:
+    @pytest.mark.parametrize("limit", [8, 12, 16])
+    def test_too_few_are_named_in_one_line_with_the_way_out(self, limit, tmp_path):
+        words = [*SHORT, "--workers", "2", "--out", tmp_path / "run"]
+        status, _, errors = run(*words, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (limit, limit)))
+        (line,) = said(errors)
+        assert status in (1, 2)
+        assert "ulimit -n" in line
 
 
 class TestReadOnly:

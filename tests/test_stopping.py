@@ -22,6 +22,15 @@ with stopping.listening(), stopping.stoppable(lambda: ("nothing",), waits=True):
     assert stopping.is_asked()
     signal.raise_signal(signal.SIGINT)
 """
+DONE = """
+import signal
+from mazebench import stopping
+with stopping.listening(), stopping.stoppable(lambda: ("nothing",)):
+    stopping.finish()
+    signal.raise_signal(signal.SIGTERM)
+signal.raise_signal(signal.SIGINT)
+print("done")
+"""
 
 
 def how_to_go_on() -> tuple[str, ...]:
@@ -74,8 +83,14 @@ def test_interrupts_that_are_ignored_from_the_start_stay_ignored():
         signal.signal(signal.SIGINT, before)
 
 
-def test_an_interrupt_while_modules_are_imported_is_one_line(tmp_path):
-    (tmp_path / "typer.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")  # imported first
+def test_a_command_that_is_done_is_not_stopped_any_more():
+    run = subprocess.run([sys.executable, "-c", DONE], capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "done\n", "")
+
+
+@pytest.mark.parametrize("module", ["gymnasium", "typer"])  # of the package and of the command
+def test_an_interrupt_while_modules_are_imported_is_one_line(module, tmp_path):
+    (tmp_path / f"{module}.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     run = subprocess.run(
         [sys.executable, "-m", "mazebench", "list"],
         cwd=tmp_path,

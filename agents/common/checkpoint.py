@@ -13,6 +13,7 @@ import torch
 
 from mazebench.errors import InputError, shortened
 from mazebench.maps.file_kinds import kind_of, way_out
+from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.options import Config, override
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
@@ -21,6 +22,9 @@ FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"
 
 _MAX_BYTES = 256 * 2**20
+_MAX_TENSORS = 10_000
+# Of weights, and of the counts and masks beside them.
+_DTYPES = (torch.float32, torch.float64, torch.float16, torch.bfloat16, torch.int64, torch.bool)
 
 
 def save_checkpoint(path: pathlib.Path, tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, Any]) -> None:
@@ -36,13 +40,16 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     """Returns the tensors and the metadata of a checkpoint of `agent`.
 
     Raises:
-      InputError: if the file can't be read, is damaged or larger than 256 MiB, or is another agent's checkpoint.
+      InputError: if the file can't be read, is damaged or larger than 256 MiB, or is another agent's checkpoint; if its
+        tensors are many, of a type that no network has, or not finite, or its context size is no maze's.
     """
     content = read_at_most(path, _MAX_BYTES, "checkpoint")
+    text = content[8 : 8 + int.from_bytes(content[:8], "little")]  # the header, after its length
+    if (num_tensors := text.count(b'"data_offsets"')) > _MAX_TENSORS:  # before each takes time
+        raise InputError(f"{path}: expected a checkpoint of at most {_MAX_TENSORS:,} tensors, found {num_tensors:,}")
     try:
         tensors = safetensors.torch.load(content)
-        # The header is JSON, after eight bytes with its length.
-        header = parse_json(content[8 : 8 + int.from_bytes(content[:8], "little")])
+        header = parse_json(text)
         metadata = parse_json(header["__metadata__"][FORMAT])
     except (safetensors.SafetensorError, ValueError, KeyError) as error:
         kind = kind_of(content)
@@ -51,6 +58,14 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     name = metadata.get("agent") if isinstance(metadata, dict) else metadata
     if not isinstance(metadata, dict) or name != agent:
         raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(name)[:80]!r}")
+    for name, tensor in sorted(tensors.items()):
+        if tensor.dtype not in _DTYPES:
+            raise InputError(f"{path}: expected floats in {name[:80]}, found {tensor.dtype}")
+        if not tensor.to(torch.float32).isfinite().all():
+            raise InputError(f"{path}: expected finite numbers in {name[:80]}, found nan or inf")
+    size = metadata.get("context_size", MIN_SIZE)  # files of an optimizer have none
+    if type(size) is not int or not MIN_SIZE <= size <= MAX_SIZE:
+        raise InputError(f"{path}: expected a context_size of {MIN_SIZE} to {MAX_SIZE}, found {str(size)[:80]}")
     return tensors, metadata
 
 
@@ -62,7 +77,7 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
     """
     tensors, metadata = load_checkpoint(path, agent)
     try:
-        config, context_size = override(default, metadata["config"]), int(metadata["context_size"])
+        config, context_size = override(default, metadata["config"]), metadata["context_size"]
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
     return tensors, config, context_size
@@ -72,8 +87,11 @@ def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str,
     """Copies `tensors` into `module`.
 
     Raises:
-      InputError: if a name or a shape differs.
+      InputError: if a name or a shape differs, or there are whole numbers for floats.
     """
+    for name, wanted in module.state_dict().items():
+        if name in tensors and tensors[name].is_floating_point() != wanted.is_floating_point():
+            raise InputError(f"{path}: expected {wanted.dtype} in {name}, found {tensors[name].dtype}")
     try:
         module.load_state_dict(dict(tensors))
     except RuntimeError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import pathlib
 from typing import Annotated
 
@@ -18,6 +19,7 @@ def report(
     out: Annotated[pathlib.Path, typer.Option(help="Folder for the report; an earlier report in it is replaced.")],
 ) -> None:
     """Make tables, figures and a page to explore every episode from results of `mazebench eval`."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns where it finds no folder or letter of its own
     try:
         from mazebench.report.write_report import PAGE, counted, write_report
     except ImportError as error:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mazebench import __version__
+from mazebench import __version__, stopping
 from mazebench.agent import Observation
 from mazebench.agent_loading import load_agent_class
 from mazebench.envs.env_spec import env_spec_of
@@ -113,6 +113,7 @@ def collect_demonstrations(
                 with open_whole(path) as file:
                     file.write(content.getbuffer())
                 storage.update_metadata(metadata | {"dataset_size": storage.get_size()})
+                stopping.finish()
                 temporary.rename(folder)
             except OSError as error:
                 raise RunError(f"{folder}: can't write there: {error.strerror}; nothing is kept") from error

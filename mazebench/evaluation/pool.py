@@ -5,6 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import concurrent.futures.process
 import dataclasses
+import errno
 import functools
 import multiprocessing
 import multiprocessing.resource_tracker
@@ -78,7 +79,8 @@ class Pool:
         try:
             waiting = {self._executor.submit(_run_until_stopped, packed, chunk) for chunk in chunks}
         except OSError as error:
-            raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}") from error
+            way = "; raise the limit by `ulimit -n`, or use fewer" * (error.errno == errno.EMFILE)
+            raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}{way}") from error
         finally:
             self._processes |= set(multiprocessing.active_children()) - before
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)

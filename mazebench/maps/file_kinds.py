@@ -4,13 +4,18 @@ from __future__ import annotations
 
 _PICTURE = "convert it to PNG"
 _DRAWING = "export it as PNG and give its scale by --pixel-size"
-_READ = "text, pictures such as PNG, arrays (.npy) and ROS maps (.yaml) are read"
+_READ = "text, pictures such as PNG, arrays (.npy) and ROS maps (.yaml) are read; convert another picture to PNG"
 _TENSORS = "save its tensors as safetensors or its array as .npy"
 # The first bytes of all pictures that are read.
-_PICTURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*", b"RIFF", b"P2", b"P5", b"P6")
+_PICTURES: tuple[bytes, ...] = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_PICTURES += (b"RIFF", b"P2", b"P5", b"P6", b"P1\n", b"P3\n", b"P4\n", b"P1\r\n", b"P3\r\n", b"P4\r\n")
+# And of others: JPEG 2000 and XL, PAM, SGI, Photoshop, GIMP, QOI, OpenEXR, DDS and icons.
+_OTHERS: tuple[bytes, ...] = (b"\0\0\0\x0cjP", b"\xff\x4f\xff\x51", b"\0\0\0\x0cJXL", b"\xff\x0a", b"P7\n", b"\1\xda")
+_OTHERS += (b"8BPS", b"gimp xcf", b"qoif", b"v/1\1", b"DDS ", b"\0\0\1\0", b"icns")
 # By the first bytes: the name, and what to do with a file that is not read.
 _KINDS = {
     **dict.fromkeys(_PICTURES, ("a picture", "")),
+    **dict.fromkeys(_OTHERS, ("a picture of another format", _PICTURE)),
     b"\x93NUMPY": ("a NumPy array", ""),
     b"image:": ("the yaml of a ROS map", ""),
     b"%PDF": ("a PDF", _DRAWING),

@@ -12,7 +12,7 @@ from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.older_map import OlderMap, lay_on, one_for_each
 from mazebench.maps.readers.arrays import read_array_file
-from mazebench.maps.readers.image import grid_of_image, read_picture
+from mazebench.maps.readers.image import grid_of_image, is_picture, read_picture
 from mazebench.maps.readers.occupancy_grid import FREE, LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.readers.ros import (
     ROS_SUFFIXES,
@@ -25,7 +25,8 @@ from mazebench.maps.readers.ros import (
 )
 from mazebench.maps.readers.text_map import read_text
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pbm", ".pnm", ".tif", ".tiff", ".webp", ".gif")
+_JPEG = (".jpg", ".jpeg", ".jfif")
+IMAGE_SUFFIXES = (".png", *_JPEG, ".bmp", ".pgm", ".ppm", ".pbm", ".pnm", ".tif", ".tiff", ".webp", ".gif")
 _TABLE_SUFFIXES = (".csv", ".json")  # of files that may be something else
 ARRAY_SUFFIXES = (".npy", ".npz")
 # In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
@@ -35,7 +36,7 @@ _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 
 
 def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any) -> Maze:
-    """Reads the maze in one file: a ROS map, an array or a picture if the suffix says so, else text.
+    """Reads the maze in one file: a ROS map, an array or a picture if the suffix says so; else a picture or text.
 
         >>> maze = mazebench.read_maze("plan.png")
 
@@ -109,7 +110,7 @@ def _read_grid(path: pathlib.Path, size: int | None, options: ReadOptions) -> Oc
         return read_occupancy(path)
     if suffix in ARRAY_SUFFIXES:
         return read_array_file(path)
-    if suffix not in IMAGE_SUFFIXES:
+    if suffix not in IMAGE_SUFFIXES and not is_picture(path):
         return read_text(path)
     if (ros_map := map_of_picture(path)) is not None:
         raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pathlib
+import struct
+import tokenize
 import zipfile
 import zlib
 from typing import Any
@@ -12,8 +14,10 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.storage.files import open_file
 
-# What NumPy raises for an archive that is damaged, encrypted or packed in another way.
-UNREADABLE = (OSError, EOFError, ValueError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error)
+# What NumPy raises for an archive that is damaged, encrypted or packed in another way, and for the head of an array,
+# which it reads as Python.
+_BAD_HEAD = (SyntaxError, tokenize.TokenError, TypeError, LookupError, OverflowError, struct.error)
+UNREADABLE = (OSError, EOFError, ValueError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error, *_BAD_HEAD)
 _MAX_BYTES = 2**31  # that an archive may unpack to
 
 

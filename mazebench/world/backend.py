@@ -53,6 +53,8 @@ def rendering_error(error: Exception) -> RenderingError:
     # Other variables that keep a backend from loading, after which MuJoCo lacks its renderer.
     if backend in _LIBRARIES and platform and platform.lower() != backend:
         reason, advice = f"PYOPENGL_PLATFORM={platform} names another backend", "unset it before Python starts"
+    elif isinstance(error, AttributeError) and backend in _LIBRARIES and backend not in installed:
+        reason = f"the library {_LIBRARIES[backend]} is not installed"
     elif backend == "egl" and not device.strip().isdecimal():
         reason, advice = f"expected MUJOCO_EGL_DEVICE_ID as a number, found {device!r}", "set it before Python starts"
     return RenderingError(f"can't open a rendering context, {setting}: {reason}; {advice}")

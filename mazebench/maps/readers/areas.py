@@ -64,7 +64,7 @@ class Enclosed(NamedTuple):
     column: int
     height: int  # in cells, without what makes it square
     width: int
-    walls: np.ndarray  # [N, N] bool
+    walls: np.ndarray  # [N, N] bool; N is at most MAX_SIZE + 1, so that a larger area takes no memory
 
 
 def lay_cells(blocked: np.ndarray, pixels: int, rim: Rim | None) -> Cells:
@@ -74,7 +74,7 @@ def lay_cells(blocked: np.ndarray, pixels: int, rim: Rim | None) -> Cells:
     the picture if that is not the edge of `blocked`.
     """
     # The pixels that are the upper left ones of squares in which none is blocked.
-    square = np.ones((pixels, pixels), np.uint8)
+    square = np.ones((min(pixels, max(blocked.shape) + 1),) * 2, np.uint8)  # no larger one lies on the map
     free = cv2.erode((~blocked).astype(np.uint8), square, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
     offsets = range(0, pixels, math.ceil(pixels / _MOST_PHASES))
     laid = [
@@ -140,8 +140,9 @@ def enclose(free: np.ndarray, smallest: int) -> Enclosed:
             first, last = min(first, 0), max(last, free.shape[1 - axis])
         spans.append((first, last - first))
     (row, height), (column, width) = spans
-    walls = np.ones((max(height, width, smallest),) * 2, dtype=bool)
-    rows, columns = np.nonzero(free)
+    size = min(max(height, width, smallest), MAX_SIZE + 1)
+    walls = np.ones((size, size), dtype=bool)
+    rows, columns = np.nonzero(free[: row + size, : column + size])
     walls[rows - row, columns - column] = False
     return Enclosed(row, column, height, width, walls)
 

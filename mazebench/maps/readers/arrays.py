@@ -5,20 +5,22 @@ from __future__ import annotations
 import dataclasses
 import io
 import pathlib
+import sys
 from typing import Any
 
 import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of
-from mazebench.maps.maze import Maze, MazeError
+from mazebench.maps.maze import MAX_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
 from mazebench.maps.readers.occupancy_grid import UNKNOWN, OccupancyGrid, locate_maze
 from mazebench.storage.array_files import UNREADABLE, unpack
 from mazebench.storage.files import read_at_most
 
-_MAX_BYTES = 2**27  # of a file, and of what an archive unpacks to
+_MAX_SIDE = 4 * MAX_SIZE  # of an array, of which an area is the maze
+_MAX_BYTES = 2 * _MAX_SIDE**2  # of a file, and of what an archive unpacks to
 
 
 def maze_from_array(array: Any, name: str = "maze", **options: Any) -> Maze:
@@ -65,7 +67,7 @@ def read_array_file(path: pathlib.Path) -> OccupancyGrid:
       InputError: if the file can't be read.
       MazeError: if the array is none of `maze_from_array`.
     """
-    content = read_at_most(path, _MAX_BYTES, "array")
+    content = read_at_most(path, _MAX_BYTES, "NumPy array")
     expected = f"{path}: expected a {path.suffix} file of numbers"
     try:
         loaded = np.load(io.BytesIO(content), allow_pickle=False)
@@ -88,6 +90,12 @@ def grid_of_array(array: np.ndarray, name: str) -> OccupancyGrid:
         mask, known = np.ma.getmaskarray(array), array.compressed()
         grid = grid_of_array(array.filled(known[0] if len(known) else 0), name)
         return dataclasses.replace(grid, states=np.where(mask, np.int8(UNKNOWN), grid.states))
-    if array.dtype.kind == "U" and array.ndim == 2 and np.char.str_len(array).max(initial=0) == 1:
-        return grid_of_characters(["".join(row) for row in array], name)
+    if array.ndim == 2 and max(array.shape) > _MAX_SIDE:  # before a square is made of it
+        raise MazeError(f"{name}: expected at most {MAX_SIZE} cells a side, found {array.shape[0]} x {array.shape[1]}")
+    if array.dtype.kind == "S":
+        array = np.char.decode(array, "latin-1")
+    if array.dtype.kind == "U" and array.ndim == 2 and array.size and (np.char.str_len(array) == 1).all():
+        letters = array.astype("<U1")
+        if letters.view(np.uint32).max() <= sys.maxunicode:  # a file may hold any number
+            return grid_of_characters(["".join(row) for row in letters], name)
     return grid_of_numbers(array, name)

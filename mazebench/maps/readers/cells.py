@@ -41,7 +41,7 @@ def grid_of_numbers(array: np.ndarray, name: str) -> OccupancyGrid:
     is_percent = is_whole and array.min() >= UNKNOWN and _LEAST_PERCENT <= array.max() <= OCCUPIED
     if not (is_ternary or is_percent):
         found = np.unique(array)
-        values = ", ".join(f"{value:g}" for value in found[:6]) + (f", ... {found[-1]:g}" if len(found) > 6 else "")
+        values = ", ".join(map(str, found[:6])) + (f", ... {found[-1]}" if len(found) > 6 else "")
         raise MazeError(
             f"{name}: expected walls as bool or as 0 and 1, or occupancy as -1, 0 and 1 or as per cent up to 100, "
             f"found {array.dtype} with the values {values}; `array == VALUE` says which are walls"

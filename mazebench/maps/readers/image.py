@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import pathlib
 import struct
@@ -13,18 +14,21 @@ import warnings
 import cv2
 import numpy as np
 import PIL.Image
+import PIL.ImageFile
 import PIL.ImageOps
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, remark
 from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, MazeError, require_closed_border, require_connected
 from mazebench.maps.pictures import MAX_SIDE
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
-from mazebench.storage.files import read_at_most
+from mazebench.storage.files import open_file, read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
 _MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing of this package
 _FORMATS = ("PNG", "JPEG", "BMP", "GIF", "PPM", "TIFF", "WEBP")
+_DAMAGED = (OSError, ValueError, SyntaxError, EOFError, OverflowError, LookupError, TypeError, struct.error)  # Pillow's
+_LEAST_WHITE = 0.25  # of the lightest shade there can be; in a deep picture with less, another one means white
 _MIN_SIDE = 3  # cells on the shorter side: wall, floor, wall
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
@@ -32,40 +36,78 @@ _DARK_CELL = 0.35  # of the lightest shade, up to which a cell with soft edges i
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
 
 
+def is_picture(path: str | pathlib.Path) -> bool:
+    """Returns whether a file begins as a picture that is read, whatever its name says.
+
+    Raises:
+      InputError: if it can't be read.
+    """
+    with open_file(path, "map") as file:
+        return kind_of(file.read(1000)) == "a picture"
+
+
 def read_picture(path: str | pathlib.Path) -> np.ndarray:
     """Returns the picture in a file, as `grid_of_image` takes it.
 
     Raises:
       InputError: if the file can't be read or has more than 128 MiB.
-      MazeError: if it is no picture, or has too many pixels.
+      MazeError: if it is no picture, has too many pixels, or more than 8 bits of which only the lowest are used.
     """
-    content = read_at_most(path, _MAX_BYTES, "picture")
+    content, image, num_pages = read_at_most(path, _MAX_BYTES, "picture"), None, 1
     try:
         with warnings.catch_warnings(action="ignore"), PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as picture:
-            if picture.width * picture.height <= _MAX_PIXELS:  # as its head says, before they take memory
-                return _as_array(picture)
             found = f"{picture.width} x {picture.height}"
+            if picture.width * picture.height <= _MAX_PIXELS:  # as its head says, before they take memory
+                image = _as_array(picture, content, str(path))
+                with contextlib.suppress(*_DAMAGED):  # of pages after the first
+                    num_pages = getattr(picture, "n_frames", 1)
+    except MazeError:
+        raise
     except PIL.Image.DecompressionBombError:
         found = "many more"
-    except (OSError, ValueError, SyntaxError, EOFError, OverflowError, LookupError, struct.error) as error:
+    except _DAMAGED as error:
         kind = kind_of(content) or "a file of another kind"
         raise MazeError(
             f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
         ) from error
-    raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {found}; crop it, or lower its resolution")
+    if image is None:
+        raise MazeError(
+            f"{path}: expected at most {_MAX_PIXELS} pixels, found {found}; crop it, or lower its resolution"
+        )
+    if num_pages > 1:
+        remark(f"{path}: the first of {num_pages} pages is read; save another one as a picture of its own")
+    return image
 
 
-def _as_array(picture: PIL.Image.Image) -> np.ndarray:
-    """Returns a picture as its camera was held, as `grid_of_image` takes it."""
-    is_png = picture.format == "PNG"  # the only format whose opacity counts
-    picture = PIL.ImageOps.exif_transpose(picture)
-    if picture.mode == "1":
-        return np.asarray(picture.convert("L"))
-    if picture.mode == "L" and "transparency" not in picture.info:
-        return np.asarray(picture)
-    if picture.mode.startswith("I"):
-        return np.asarray(picture).astype(np.uint16)
-    return np.asarray(picture.convert("RGBA" if is_png and picture.has_transparency_data else "RGB"))
+def _as_array(picture: PIL.ImageFile.ImageFile, content: bytes, name: str) -> np.ndarray:
+    """Returns a picture, in a file of `content`, as its camera was held, as `grid_of_image` takes it.
+
+    Raises:
+      MazeError: if it has more than 8 bits and none of its shades is light.
+    """
+    is_deep = picture.mode[0] in "IF" or ";16" in str(picture.tile)
+    if picture.format == "PPM":
+        (tile,) = picture.tile
+        if content[tile.offset - 1 : tile.offset + 1] == b"\r\n":  # the head's last line end, of which one is expected
+            picture.tile = [tile._replace(offset=tile.offset + 1)]
+    upright = PIL.ImageOps.exif_transpose(picture)
+    mode, has_opacity = upright.mode, upright.has_transparency_data
+    white = 65535 if mode[0] == "I" else 255
+    if mode[0] in "IF" or (mode in ("1", "L") and not has_opacity):
+        image = np.asarray(upright if mode != "1" else upright.convert("L"))
+    else:
+        image = np.asarray(upright.convert("RGBA" if has_opacity else "RGB"))
+
+    # Which number is white is certain only if the lightest shade is near to it.
+    if is_deep and not has_opacity and image.any():
+        low, high = float(image.min()), float(image.max())
+        if not (low >= 0 and _LEAST_WHITE * white <= high <= white):
+            found = f"{low:g} to {high:g} in a picture of 16 or 32 bits; save it with 8 bits"
+            raise MazeError(f"{name}: expected shades of which the lightest is near {white}, found {found}")
+    image = image.astype(np.uint16 if white > 255 else np.uint8)
+    if has_opacity and image.ndim == 2:  # one of the shades is transparent
+        return np.dstack([image] * 3 + [np.where(image == upright.info["transparency"], 0, white).astype(image.dtype)])
+    return image
 
 
 def grid_of_image(image: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
@@ -122,7 +164,7 @@ def to_gray(image: np.ndarray, name: str) -> np.ndarray:
     # Make pixels in strong colours white, which are marks, unless they may be paper or walls.
     is_mark = colours.max(axis=2) - colours.min(axis=2) >= _MARK_SATURATION
     dark = gray < 128
-    if is_mark.mean() < _MAX_MARK_SHARE and is_mark[dark].mean() < _MAX_MARK_SHARE:
+    if is_mark.mean() < _MAX_MARK_SHARE and dark.any() and is_mark[dark].mean() < _MAX_MARK_SHARE:
         gray[is_mark] = 255
 
     # Lay the picture on white paper.

@@ -207,7 +207,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
         changes += _describe_outside(areas[number], enclosed[number], outside)
         lost = _describe_lost(seen, pixels, areas, number, options, radius)
     row, column, height, width, walls = enclosed[number]
-    size = len(walls)
+    size = max(height, width, len(walls))
     if size > MAX_SIZE:
         remedy = "save it as a ROS map, which is coarsened" if grid.is_cells else "give a larger cell_size"
         raise MazeError(f"{name}: expected at most {MAX_SIZE} cells a side, found {size} of {cell_size:g} m; {remedy}")

@@ -70,7 +70,7 @@ class _Metadata(pydantic.BaseModel):
 
     # Absolute, or beside the YAML file.
     image: str = pydantic.Field(pattern=r"^[^\x00]{1,1000}$", description="the name of a picture")
-    resolution: float = pydantic.Field(gt=0, allow_inf_nan=False, description="the side of a pixel, above 0 m")
+    resolution: float = pydantic.Field(ge=0.001, le=100, description="the side of a pixel, 0.001 to 100 m")
     # x, y (m) and yaw (rad) of the lower left corner of the picture
     origin: tuple[pydantic.FiniteFloat, pydantic.FiniteFloat, float] = pydantic.Field(
         description="three finite numbers, [x, y, yaw]"

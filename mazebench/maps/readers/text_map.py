@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from mazebench.maps.file_kinds import kind_of, way_out
-from mazebench.maps.maze import MazeError
+from mazebench.maps.maze import MAX_SIZE, MazeError
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
 from mazebench.maps.readers.occupancy_grid import OccupancyGrid
 from mazebench.maps.readers.tables import cells_in_table, numbers_in_table, separator_of
@@ -18,6 +18,8 @@ from mazebench.storage.files import read_at_most
 from mazebench.storage.json_files import parse_json
 
 _MAX_BYTES = 2**26  # 1,024 rows of 1,024 numbers with 18 digits take a third of it
+_MAX_ROWS = 4 * MAX_SIZE  # of which an area is the maze
+_MAX_WIDTH = 25 * _MAX_ROWS  # characters in a row; numpy.savetxt writes 25 for each number
 _ENCODINGS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 _POSTS = re.compile(r"([+o*.])(-+)\1(?:\2\1)*")  # the first line of a maze with walls between posts
 # Characters of double width, as East Asian fonts have them, and what only chooses how the one before is drawn.
@@ -58,6 +60,9 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     """
     # Only these end a line: splitlines() would also split at characters that a text map must refuse.
     text = text.replace("\r\n", "\n").replace("\r", "\n").translate(_SAME)
+    num_rows = 0 if text.lstrip().startswith("{") else text.count("]") or text.count("\n") + text.count("\\")
+    if num_rows > _MAX_ROWS:
+        raise MazeError(f"{name}: expected at most {MAX_SIZE} cells a side, found {num_rows:,} rows")
     if text.startswith("type "):
         return _moving_ai(text, name)
     if text.lstrip().startswith("{"):
@@ -67,7 +72,9 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
         lines = lines[0].split(",") if len(list(filter(None, lines))) == 1 else lines
     else:
         lines = re.sub(r"\\n|\\+", "\n", text).split("\n")  # D4RL ends a row with a backslash
-    lines = [re.sub(r"^\s*\(+|\)[),]*\s*$", "", line) for line in lines]  # of tuples in a program
+    if len(lines) > _MAX_ROWS or max(map(len, lines), default=0) > _MAX_WIDTH:
+        raise MazeError(f"{name}: expected at most {MAX_SIZE} cells a side, found more")
+    lines = [_without_brackets(line) for line in lines]
     _require_one_maze(lines, name)
     if (separator := separator_of(lines)) is not None:
         cells = cells_in_table(lines, separator, name)
@@ -113,6 +120,13 @@ def _moving_ai(text: str, name: str) -> OccupancyGrid:
             f"line 'map', found {len(rows)} of {min(map(len, rows))} to {max(map(len, rows))}"
         )
     return grid_of_characters(rows, name, is_moving_ai=True)
+
+
+def _without_brackets(line: str) -> str:
+    """Returns a row without the round brackets of a tuple in a program."""
+    line = re.sub(r"^\s*\(+", "", line)
+    end = line.find(")", len(line.rstrip().rstrip("),")))
+    return line if end < 0 else line[:end]
 
 
 def _require_one_maze(lines: list[str], name: str) -> None:
