@@ -125,8 +125,8 @@ def freeze_buildings(
                 rng = np.random.default_rng([_SEED, number, strength])
                 try:
                     changed, _ = change(maze, strength, rng, f"{name}-changed-{strength}")
-                except InputError as error:
-                    faults.append((f"{row['map']}, changed by strength {strength}", str(error)))
+                except InputError:
+                    faults.append((row["map"], f"as a changed building of strength {strength}, which it can't carry"))
                     break
                 built.append((f"changed-{strength}", changed.name, changed, OlderMap(maze.walls, changed)))
         for setting, own_name, own, shown in built:
