@@ -91,7 +91,7 @@ class TestFollower:
     def test_on_the_right_map_the_robot_drives_the_shortest_way(self, kind, seed):
         maze = plan_of(kind, 21, seed)
         pairs = draw_pairs(maze, 20, np.random.default_rng(seed))
-        cells, driven, shortest = follow(maze.walls, maze.walls, pairs, SIGHT, most=2)
+        cells, driven, shortest, _ = follow(maze.walls, maze.walls, pairs, SIGHT, most=2)
         distances = [maze.distance(divmod(start, maze.size), divmod(goal, maze.size)) for start, goal in pairs.tolist()]
         assert driven.tolist() == shortest.tolist() == distances
         assert cells[np.cumsum(driven + 1) - 1].tolist() == pairs[:, 1].tolist()
@@ -102,14 +102,14 @@ class TestFollower:
         walls = plan.walls.copy()
         walls[6, 5] = True
         # The way on the map is 12 cells long. After 7 of them, a robot that sees far looks around the corner at (3, 5).
-        _, driven, shortest = follow(walls, plan.walls, DEAD_END_PAIRS, sight, most=9)
+        _, driven, shortest, _ = follow(walls, plan.walls, DEAD_END_PAIRS, sight, most=9)
         assert (driven, shortest) == ([turned_after + turned_after + 16], [16])
 
     def test_where_the_map_shows_no_way_the_robot_finds_one(self):
         plan = parse_maze(DEAD_END)
         shown = plan.walls.copy()
         shown[:, 4] = True
-        _, driven, shortest = follow(plan.walls, shown, DEAD_END_PAIRS, SIGHT, most=9)
+        _, driven, shortest, _ = follow(plan.walls, shown, DEAD_END_PAIRS, SIGHT, most=9)
         assert shortest <= driven < 9 * shortest
 
 
@@ -135,7 +135,7 @@ class TestChanges:
         plan, (building, found) = plan_of("house"), change_of("house", strength)
         pairs = draw_pairs(plan, 300, np.random.default_rng(7))
         pairs = pairs[~building.walls.ravel()[pairs].any(axis=1)]
-        _, driven, shortest = follow(building.walls, plan.walls, pairs, SIGHT, ON_TIME[0])
+        _, driven, shortest, _ = follow(building.walls, plan.walls, pairs, SIGHT, ON_TIME[0])
         assert (driven > ON_TIME[0] * shortest).mean() == pytest.approx(LATE[strength - 1], abs=0.07)
         assert found.late_without_map >= LATE_WITHOUT_MAP
 
