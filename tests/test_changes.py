@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -111,6 +112,25 @@ class TestFollower:
         shown[:, 4] = True
         _, driven, shortest, _ = follow(plan.walls, shown, DEAD_END_PAIRS, SIGHT, most=9)
         assert shortest <= driven < 9 * shortest
+
+    @given(st.sampled_from(sorted(KINDS)), st.integers(0, 1000), st.booleans())
+    @settings(max_examples=40, deadline=None)
+    def test_what_changes_outside_of_its_box_changes_nothing_of_a_drive(self, kind, seed, has_map):
+        maze, rng = plan_of(kind, 41, seed % 3), np.random.default_rng(seed)
+        pairs = draw_pairs(dataclasses.replace(maze, cell_size=4.0), 5, rng)
+        shown = maze.walls if has_map else np.zeros_like(maze.walls)
+        walls = maze.walls | (rng.random(maze.walls.shape) < 0.02)
+        walls.ravel()[pairs] = False
+        joined, _ = scipy.ndimage.label(~walls)
+        pairs = pairs[joined.ravel()[pairs[:, 0]] == joined.ravel()[pairs[:, 1]]]
+        before = follow(walls, shown, pairs, SIGHT, ON_TIME[0])
+        for number, (top, bottom, left, right) in enumerate(before.boxes):
+            changed = rng.random(walls.shape) < 0.5
+            changed[max(0, top) : bottom + 1, max(0, left) : right + 1] = False
+            changed[[0, -1]] = changed[:, [0, -1]] = False
+            after = follow(walls ^ changed, shown, pairs[number : number + 1], SIGHT, ON_TIME[0])
+            assert (after.driven, after.shortest) == (before.driven[number], before.shortest[number])
+            assert (after.boxes == before.boxes[number]).all()
 
 
 class TestChanges:

@@ -18,6 +18,7 @@ import numpy as np
 from mazebench.kernels import compiled
 
 _TOLERANCE = 1e-6  # cells
+_LONG = 2000  # cells, after which a search asks whether there is a way
 
 
 class Drives(NamedTuple):
@@ -87,12 +88,13 @@ def _follow(
     belief, altered = shown.copy(), [0]
     believed, told = belief.ravel(), shown.ravel()
     costs = np.full(walls.size, 2**30, np.int32)
-    tables = np.empty((4, 4 * walls.size), np.int32)
+    is_flooded = np.zeros(walls.size, np.bool_)
+    tables = np.empty((5, 4 * walls.size), np.int32)
     boxes = np.empty((len(pairs), 4), np.int64)
     boxes[:, ::2], boxes[:, 1::2] = size, 0
     for number in range(len(pairs)):
         here, goal = pairs[number]
-        way = _shortest_way(walls, here, goal, costs, tables, boxes[number])
+        way = _shortest_way(walls, here, goal, costs, is_flooded, tables, boxes[number])
         driven[number] = shortest[number] = len(way) - 1
         first = looked = len(cells)
         cells.append(here)
@@ -115,7 +117,7 @@ def _follow(
 
             # Plan again. Where there is no way, forget the map and look again from all cells of the drive.
             if is_wrong:
-                way, at = _shortest_way(belief, here, goal, costs, tables, boxes[number]), 0
+                way, at = _shortest_way(belief, here, goal, costs, is_flooded, tables, boxes[number]), 0
                 is_wrong = len(way) == 0
                 if is_wrong:
                     belief[1:-1, 1:-1] = False
@@ -140,22 +142,44 @@ def _follow(
 
 @compiled
 def _shortest_way(
-    walls: np.ndarray, start: int, goal: int, costs: np.ndarray, tables: np.ndarray, box: np.ndarray
+    walls: np.ndarray,
+    start: int,
+    goal: int,
+    costs: np.ndarray,
+    is_flooded: np.ndarray,
+    tables: np.ndarray,
+    box: np.ndarray,
 ) -> np.ndarray:
     """Returns the cells of a shortest way, none if there is no way: `[L]` int.
 
     It is an A* search with the Manhattan distance, in which a step costs nothing if it leads nearer to the goal, else
-    one detour. `walls` is `[N, N]` bool, with a closed border. `costs` (`[N * N]` int32) are 2**30 before and after,
-    and `tables` (`[4, 4 * N * N]` int32) are for its work. It widens `box` (`[4]` int, first and
-    last row and column) to hold the cells that it reaches.
+    one detour. A long search also floods the building from the goal, and ends where that does: where there is no way,
+    the part around the goal is often small. `walls` is `[N, N]` bool, with a closed border.
+
+    `costs` (`[N * N]` int32) are 2**30 before and after, `is_flooded` (`[N * N]` bool) is False, and `tables`
+    (`[5, 4 * N * N]` int32) are for its work. It widens `box` (`[4]` int, first and last row and column) to hold the
+    cells that it reaches.
     """
     size, flat = len(walls), walls.ravel()
     # Of each cell, the one before; cells by even and odd numbers of detours; cells that were reached.
-    came, stacks, reached = tables[0], tables[1:3], tables[3]
-    counts, num_reached = np.array([1, 0]), 1
+    came, stacks, reached, flooded = tables[0], tables[1:3], tables[3], tables[4]
+    counts, num_reached, num_searched, next_flooded, num_flooded = np.array([1, 0]), 1, 0, 0, 1
     costs[start], stacks[0, 0], reached[0] = 0, start, start
+    flooded[0], is_flooded[goal] = goal, True
     cell, detours = start, 0
     while cell != goal:
+        # A cell of the flood from the goal, unless it has come to the start.
+        num_searched += 1
+        if num_searched > _LONG and not is_flooded[start]:
+            if next_flooded == num_flooded:
+                break
+            for step in (1, size, -1, -size):
+                near = flooded[next_flooded] + step
+                if not flat[near] and not is_flooded[near]:
+                    flooded[num_flooded], is_flooded[near] = near, True
+                    num_flooded += 1
+            next_flooded += 1
+
         if counts[detours & 1] == 0:
             detours += 1
             if counts[detours & 1] == 0:
@@ -174,10 +198,10 @@ def _shortest_way(
                 counts[needed & 1] += 1
                 reached[num_reached] = near
                 num_reached += 1
-    for index in range(num_reached):
-        cell_reached = reached[index]
-        costs[cell_reached] = 2**30
-        row, column = cell_reached // size, cell_reached % size
+    for index in range(num_reached + num_flooded):
+        looked_at = reached[index] if index < num_reached else flooded[index - num_reached]
+        costs[looked_at], is_flooded[looked_at] = 2**30, False
+        row, column = looked_at // size, looked_at % size
         box[0], box[1] = min(box[0], row), max(box[1], row)
         box[2], box[3] = min(box[2], column), max(box[3], column)
     if cell != goal:
