@@ -75,7 +75,7 @@ def doors(count: int = 100) -> str:
             for column, percent in enumerate(percents):
                 rng = np.random.default_rng([_SEED, number, 1])
                 shown = swap_doors(maze.walls, kind, SWAPS_BY_PERCENT[kind][percent], ends, rng)
-                _, [driven], [shortest] = follow(maze.walls, shown, pair, SIGHT, ON_TIME[0])
+                _, [driven], [shortest], _ = follow(maze.walls, shown, pair, SIGHT, ON_TIME[0])
                 found[row, column] += is_blocked(maze.walls, shown, ends), driven > ON_TIME[0] * shortest
     shares = np.concatenate([found, found.mean(axis=0, keepdims=True)]) / count
     rows = [

@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -91,7 +92,7 @@ class TestFollower:
     def test_on_the_right_map_the_robot_drives_the_shortest_way(self, kind, seed):
         maze = plan_of(kind, 21, seed)
         pairs = draw_pairs(maze, 20, np.random.default_rng(seed))
-        cells, driven, shortest = follow(maze.walls, maze.walls, pairs, SIGHT, most=2)
+        cells, driven, shortest, _ = follow(maze.walls, maze.walls, pairs, SIGHT, most=2)
         distances = [maze.distance(divmod(start, maze.size), divmod(goal, maze.size)) for start, goal in pairs.tolist()]
         assert driven.tolist() == shortest.tolist() == distances
         assert cells[np.cumsum(driven + 1) - 1].tolist() == pairs[:, 1].tolist()
@@ -102,15 +103,34 @@ class TestFollower:
         walls = plan.walls.copy()
         walls[6, 5] = True
         # The way on the map is 12 cells long. After 7 of them, a robot that sees far looks around the corner at (3, 5).
-        _, driven, shortest = follow(walls, plan.walls, DEAD_END_PAIRS, sight, most=9)
+        _, driven, shortest, _ = follow(walls, plan.walls, DEAD_END_PAIRS, sight, most=9)
         assert (driven, shortest) == ([turned_after + turned_after + 16], [16])
 
     def test_where_the_map_shows_no_way_the_robot_finds_one(self):
         plan = parse_maze(DEAD_END)
         shown = plan.walls.copy()
         shown[:, 4] = True
-        _, driven, shortest = follow(plan.walls, shown, DEAD_END_PAIRS, SIGHT, most=9)
+        _, driven, shortest, _ = follow(plan.walls, shown, DEAD_END_PAIRS, SIGHT, most=9)
         assert shortest <= driven < 9 * shortest
+
+    @given(st.sampled_from(sorted(KINDS)), st.integers(0, 1000), st.booleans())
+    @settings(max_examples=40, deadline=None)
+    def test_what_changes_outside_of_its_box_changes_nothing_of_a_drive(self, kind, seed, has_map):
+        maze, rng = plan_of(kind, 41, seed % 3), np.random.default_rng(seed)
+        pairs = draw_pairs(dataclasses.replace(maze, cell_size=4.0), 5, rng)
+        shown = maze.walls if has_map else np.zeros_like(maze.walls)
+        walls = maze.walls | (rng.random(maze.walls.shape) < 0.02)
+        walls.ravel()[pairs] = False
+        joined, _ = scipy.ndimage.label(~walls)
+        pairs = pairs[joined.ravel()[pairs[:, 0]] == joined.ravel()[pairs[:, 1]]]
+        before = follow(walls, shown, pairs, SIGHT, ON_TIME[0])
+        for number, (top, bottom, left, right) in enumerate(before.boxes):
+            changed = rng.random(walls.shape) < 0.5
+            changed[max(0, top) : bottom + 1, max(0, left) : right + 1] = False
+            changed[[0, -1]] = changed[:, [0, -1]] = False
+            after = follow(walls ^ changed, shown, pairs[number : number + 1], SIGHT, ON_TIME[0])
+            assert (after.driven, after.shortest) == (before.driven[number], before.shortest[number])
+            assert (after.boxes == before.boxes[number]).all()
 
 
 class TestChanges:
@@ -135,7 +155,7 @@ class TestChanges:
         plan, (building, found) = plan_of("house"), change_of("house", strength)
         pairs = draw_pairs(plan, 300, np.random.default_rng(7))
         pairs = pairs[~building.walls.ravel()[pairs].any(axis=1)]
-        _, driven, shortest = follow(building.walls, plan.walls, pairs, SIGHT, ON_TIME[0])
+        _, driven, shortest, _ = follow(building.walls, plan.walls, pairs, SIGHT, ON_TIME[0])
         assert (driven > ON_TIME[0] * shortest).mean() == pytest.approx(LATE[strength - 1], abs=0.07)
         assert found.late_without_map >= LATE_WITHOUT_MAP
 

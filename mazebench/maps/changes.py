@@ -5,19 +5,20 @@ ones are opened, and furniture has come and gone. The strength of the changes is
 believes the plan: an episode is late if the robot drives over 1.25 times the shortest way. All that is drawn and
 compared are whole numbers and their ratios, so that one seed gives one building on every machine.
 
-`P` is the number of pairs of a start and a goal, and `N` of rows and columns.
+`P` is the number of pairs of a start and a goal, `Q` of passages of the plan, and `N` of rows and columns.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
@@ -44,16 +45,25 @@ _NUM_TRIES, _NUM_MISSES = 8, 7  # of a strength, and of changes in a row that a 
 _CELL = 1e-6  # cells, a tolerance
 
 
+class _Drives(NamedTuple):
+    """The episodes in a building on which lateness is measured."""
+
+    walls: np.ndarray  # [N, N] bool, of the building
+    is_late: np.ndarray  # [P] bool
+    boxes: np.ndarray  # [P, 4] int, as of `follow`
+
+
 class Change(NamedTuple):
     """The changes in a building since its plan was drawn, or a draft of them, and their cost."""
 
     walls: np.ndarray  # [N, N] bool
-    passages: tuple[Passage, ...]  # that may still change
+    is_left: np.ndarray  # [Q] bool: the passages of the plan that may still change
     things: tuple[tuple[tuple[slice, ...], np.ndarray], ...]  # furniture of the plan that is left: its box and shape
     done: tuple[str, ...] = ()  # a passage was "closed" or "opened", a piece of furniture "added" or "removed"
     late: float = 0.0  # share of late episodes of a robot that believes the plan
     late_without_map: float = 0.0  # of one that takes for free what it has not seen
     blocked: float = 0.0  # share of those in which the shortest way on the plan is blocked
+    drives: _Drives | None = None  # on which `late` was measured
 
     def __str__(self) -> str:
         closed, opened, added, removed = map(self.done.count, ("closed", "opened", "added", "removed"))
@@ -126,6 +136,38 @@ def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> tu
     return dataclasses.replace(maze, walls=found.walls, name=name), found
 
 
+class _Strips:
+    """The passages of a plan in arrays, which are looked through at each change."""
+
+    def __init__(self, passages: tuple[Passage, ...], size: int):
+        self.boxes = np.array(passages, dtype=np.int64).reshape(-1, 5)  # [Q, 5], as `Passage` has them
+        self.is_open = self.boxes[:, 4] > 0  # [Q] bool
+        self._inside, self._around = _cells_of(self.boxes, size, 0), _cells_of(self.boxes, size, 1)
+        self._has_edge = (self.boxes[:, :2] > 0).all(axis=1)  # else nothing touches it
+
+    def most(self, values: np.ndarray) -> np.ndarray:
+        """Returns the largest one of some values of cells (`[N * N]`) in each passage: `[Q]`."""
+        cells, starts = self._inside
+        return np.maximum.reduceat(values[cells], starts) if len(starts) else np.zeros(0, dtype=values.dtype)
+
+    def touch(self, cells: np.ndarray) -> np.ndarray:
+        """Returns the passages that have some of the cells (`[N, N]` bool) in them or at their edge: `[Q]` bool."""
+        around, starts = self._around
+        touched = np.logical_or.reduceat(cells.ravel()[around], starts) if len(starts) else self._has_edge
+        return np.asarray(self._has_edge & touched)
+
+
+def _cells_of(boxes: np.ndarray, size: int, margin: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the numbers of the cells of passages with a margin, one after the other, and where each begins."""
+    top, left, bottom, right = (boxes[:, :4] + [-margin, -margin, margin, margin]).clip(0, size).T
+    widths = right - left
+    counts = (bottom - top) * widths
+    starts = np.append(0, np.cumsum(counts))
+    place = np.arange(starts[-1]) - np.repeat(starts[:-1], counts)
+    down, aside = np.divmod(place, np.repeat(widths, counts))
+    return (np.repeat(top, counts) + down) * size + np.repeat(left, counts) + aside, starts[:-1]
+
+
 class _Plan:
     """The old map, and the pairs of a start and a goal on which lateness is measured."""
 
@@ -136,7 +178,7 @@ class _Plan:
 
         # The ways on the plan by which changes are drawn; of other pairs, else these would be more late than any.
         pairs = draw_pairs(maze, _NUM_PAIRS, np.random.default_rng([seed, 0, 1]))
-        cells, lengths, _ = follow(maze.walls, maze.walls, pairs, 1.0, 1.0)
+        cells, lengths, *_ = follow(maze.walls, maze.walls, pairs, 1.0, 1.0)
         ends = np.cumsum(lengths + 1)
         ways = np.ones(len(cells), dtype=np.int64), cells, np.append(0, ends)
         self.ways = scipy.sparse.csr_array(ways, shape=(len(pairs), maze.walls.size))  # 1 at the cells of each way
@@ -148,17 +190,33 @@ class _Plan:
         boxes = enumerate(scipy.ndimage.find_objects(areas), start=1)
         most = FURNITURE[1] / self.cell_size + _CELL
         things = [(box, areas[box] == area) for area, box in boxes if max(areas[box].shape) <= most]
-        return Change(self.walls, find_passages(self.walls, self.cell_size), tuple(things))
+        return Change(self.walls, np.ones(len(self.strips.boxes), dtype=bool), tuple(things))
 
-    def late(self, walls: np.ndarray, shown: np.ndarray) -> float:
-        """Returns the share of late episodes in a building of a robot that is shown a map of it."""
-        pairs = self.pairs[~walls.ravel()[self.pairs].any(axis=1)]
-        _, driven, shortest = follow(walls, shown, pairs, self.sight, ON_TIME[0])
-        return float((driven > ON_TIME[0] * shortest).mean()) if len(pairs) else 0.0
+    @functools.cached_property
+    def strips(self) -> _Strips:
+        """The passages."""
+        return _Strips(find_passages(self.walls, self.cell_size), len(self.walls))
+
+    def drives(self, walls: np.ndarray, shown: np.ndarray, before: _Drives | None = None) -> tuple[float, _Drives]:
+        """Returns the share of late episodes in a building of a robot that is shown a map of it, and the episodes.
+
+        Those of a building `before` are taken where nothing has changed that they depend on.
+        """
+        boxes, is_late = np.tile([0, len(walls), 0, len(walls)], (len(self.pairs), 1)), np.zeros(len(self.pairs), bool)
+        is_free = is_new = ~walls.ravel()[self.pairs].any(axis=1)
+        if before is not None:
+            boxes, is_late = before.boxes.copy(), before.is_late.copy()
+            rows, columns = np.nonzero(walls != before.walls)
+            top, bottom, left, right = boxes.T[..., None]
+            touched = (top <= rows) & (rows <= bottom) & (left <= columns) & (columns <= right)
+            is_new = is_free & touched.any(axis=1)
+        _, driven, shortest, boxes[is_new] = follow(walls, shown, self.pairs[is_new], self.sight, ON_TIME[0])
+        is_late[is_new] = driven > ON_TIME[0] * shortest
+        return float(is_late[is_free].mean()) if is_free.any() else 0.0, _Drives(walls, is_late, boxes)
 
     def late_without_map(self, walls: np.ndarray) -> float:
-        """Returns the same of a robot that takes for free what it has not seen."""
-        return self.late(walls, np.zeros_like(walls))
+        """Returns the share of late episodes of a robot that takes for free what it has not seen."""
+        return self.drives(walls, np.zeros_like(walls))[0]
 
     def is_blocked(self, walls: np.ndarray) -> np.ndarray:
         """Returns the ways on the plan that are blocked in a building: `[P]` bool."""
@@ -174,7 +232,8 @@ def _changed_more(plan: _Plan, draft: Change, strength: int) -> Change:
         rng, now, num_misses = np.random.default_rng([plan.seed, strength, number]), draft, 0
         while now.late < target and num_misses < _NUM_MISSES and (new := _step(plan, now, rng)) is not None:
             if new.walls is not now.walls:
-                new = new._replace(late=plan.late(new.walls, plan.walls))
+                late, drives = plan.drives(new.walls, plan.walls, now.drives)
+                new = new._replace(late=late, drives=drives)
             is_kept = now.late <= new.late <= target + _MISS
             now, num_misses = (new, 0) if is_kept else (now, num_misses + 1)
 
@@ -202,34 +261,34 @@ def _step(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change | None
     With a passage, a piece of furniture comes or goes in half of the steps.
     """
     # The passages to close, by how many ways pass that nothing blocks yet; those to open, one like the other.
-    num_ways = (~plan.is_blocked(draft.walls) @ plan.ways).reshape(draft.walls.shape)
-    weights = [int(num_ways[each.cells()].max()) if each.is_open else 0 for each in draft.passages]
-    is_walled = [int(not each.is_open) for each in draft.passages]
-    if not any(weights) or (rng.integers(4) == 0 and any(is_walled)):
-        weights = is_walled
-    if not any(weights):
+    strips = plan.strips
+    weights = np.where(draft.is_left & strips.is_open, strips.most(~plan.is_blocked(draft.walls) @ plan.ways), 0)
+    is_walled = draft.is_left & ~strips.is_open
+    if not weights.any() or (rng.integers(4) == 0 and is_walled.any()):
+        weights = is_walled.astype(np.int64)
+    if not weights.any():
         return None
 
     # One of them. If that parts the building, a door is opened between the two parts.
-    passage = draft.passages[np.cumsum(weights).searchsorted(rng.integers(sum(weights)), side="right")]
-    new = _turned(draft, passage)
+    index = int(np.cumsum(weights).searchsorted(rng.integers(weights.sum()), side="right"))
+    new = _turned(plan, draft, index)
     areas, num_areas = scipy.ndimage.label(~new.walls)
-    if num_areas == 2 and passage.is_open:
-        doors = [each for each in new.passages if not each.is_open and {1, 2} <= set(areas[each.cells(margin=1)].flat)]
-        if doors:
-            new, num_areas = _turned(new, doors[rng.integers(len(doors))]), 1
+    if num_areas == 2 and strips.is_open[index]:
+        doors = np.flatnonzero(new.is_left & ~strips.is_open & strips.touch(areas == 1) & strips.touch(areas == 2))
+        if len(doors):
+            new, num_areas = _turned(plan, new, doors[rng.integers(len(doors))]), 1
     if num_areas != 1:
-        return draft._replace(passages=tuple(each for each in draft.passages if each != passage))
+        return draft._replace(is_left=draft.is_left & (strips.boxes != strips.boxes[index]).any(axis=1))
     return _furnished(plan, new, rng) if rng.integers(2) else new
 
 
-def _turned(draft: Change, passage: Passage) -> Change:
+def _turned(plan: _Plan, draft: Change, index: int) -> Change:
     """Returns a draft in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
+    passage = Passage(*plan.strips.boxes[index].tolist())
     walls = draft.walls.copy()
     walls[passage.cells()] = passage.is_open
-    has_changed = walls != draft.walls
-    passages = tuple(each for each in draft.passages if not has_changed[each.cells(margin=1)].any())
-    return draft._replace(walls=walls, passages=passages, done=(*draft.done, "closed" if passage.is_open else "opened"))
+    is_left = draft.is_left & ~plan.strips.touch(walls != draft.walls)
+    return draft._replace(walls=walls, is_left=is_left, done=(*draft.done, "closed" if passage.is_open else "opened"))
 
 
 def _furnished(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change:
@@ -247,9 +306,9 @@ def _furnished(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change:
     most = max(least, math.floor(FURNITURE[1] / plan.cell_size + _CELL))
     height, width = rng.integers(least, most + 1, 2)
     clear = math.ceil(CLEAR / plan.cell_size - _CELL)
-    taken = np.pad(walls | plan.walls, (0, most + 2 * clear), constant_values=True)
-    spaces = sliding_window_view(taken, (height + 2 * clear, width + 2 * clear))
-    places = np.argwhere(~spaces.any(axis=(2, 3)))
+    space = np.ones((height + 2 * clear, width + 2 * clear), np.uint8)
+    free = (~(walls | plan.walls)).astype(np.uint8)
+    places = np.argwhere(cv2.erode(free, space, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0))
     if not len(places):
         return draft
     row, column = rng.choice(places) + clear

@@ -12,7 +12,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
+
+from mazebench.kernels import compiled
 
 WIDEST = 2.4  # m, of an open passage
 THICKEST = 1.0  # m, of a wall in which a door can be opened; of a longer open passage, so much is closed
@@ -30,9 +31,9 @@ class Passage(NamedTuple):
     right: int
     is_open: bool
 
-    def cells(self, margin: int = 0) -> tuple[slice, slice]:
-        """Returns the rows and columns, with a margin of some cells."""
-        return slice(self.top - margin, self.bottom + margin), slice(self.left - margin, self.right + margin)
+    def cells(self) -> tuple[slice, slice]:
+        """Returns the rows and columns."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
 
 
 def find_passages(walls: np.ndarray, cell_size: float) -> tuple[Passage, ...]:
@@ -57,10 +58,11 @@ def find_passages(walls: np.ndarray, cell_size: float) -> tuple[Passage, ...]:
 
         # Those whose sides are far by any other way.
         padded = np.pad(grid, detour, constant_values=True)
-        for number, (top, left, bottom, right) in enumerate(np.concatenate([openings, doors]).tolist()):
-            if _is_far(padded[top : bottom + 2 * detour, left : right + 2 * detour], detour):
-                box = (left, top, right, bottom) if turned else (top, left, bottom, right)
-                passages.append(Passage(*box, is_open=number < len(openings)))
+        boxes = np.concatenate([openings, doors])
+        for number in np.flatnonzero(_are_far(padded, boxes + detour, 2 * (detour - 1))).tolist():
+            top, left, bottom, right = boxes[number].tolist()
+            box = (left, top, right, bottom) if turned else (top, left, bottom, right)
+            passages.append(Passage(*box, is_open=number < len(openings)))
     return tuple(passages)
 
 
@@ -98,28 +100,73 @@ def _blocks(cells: np.ndarray) -> np.ndarray:
     return np.array(blocks)
 
 
-def _is_far(walls: np.ndarray, detour: int) -> bool:
-    """Returns whether free cells above and below a strip are `detour` cells apart by any other way.
+@compiled
+def _are_far(walls: np.ndarray, boxes: np.ndarray, most: int) -> np.ndarray:
+    """Returns whether free cells above and below each strip are over `most` half cells apart by any other way.
 
-    `walls` is of the strip and so many cells around it. Ways do not lead through points where two free cells touch
-    diagonally.
+    Ways lead along the sides of cells and through their middles, but not through points where two free cells touch
+    diagonally. `walls` is `[H, W]` bool, with wider walls around than ways are long, and `boxes` (`[B, 4]` int) are
+    first and last rows and columns of strips in it, as `Passage` has them.
+
+    On the raster of half cells, cell (r, c) has its middle at (2 r + 1, 2 c + 1), its upper left corner at (2 r, 2 c).
     """
-    free = ~walls
-    free[detour:-detour, detour:-detour] = False
+    height, width = 2 * len(walls) + 1, 2 * walls.shape[1] + 1
+    reached = np.zeros((height, width), np.int64)  # by which strip, counted from 1
+    queue = np.empty((height * width, 2), np.int64)
+    is_far = np.zeros(len(boxes), np.bool_)
+    for number in range(len(boxes)):
+        box = boxes[number]
+        top, left, bottom, right = box
+        starts, goals = ~walls[top - 1, left:right], ~walls[bottom, left:right]
+        if not (starts.any() and goals.any()):
+            continue
 
-    # A raster of half cells, with the sides and the corners of cells between their middles.
-    halves = np.zeros(2 * np.array(free.shape) + 1, dtype=bool)
-    halves[1::2, 1::2] = free
-    strip = slice(2 * detour, -2 * detour)
-    starts, goals = np.zeros((2, *halves.shape), dtype=bool)
-    starts[2 * detour, strip] = ndimage.binary_dilation(halves[2 * detour - 1, strip])
-    goals[-2 * detour - 1, strip] = ndimage.binary_dilation(halves[-2 * detour, strip])
+        # The sides of the free cells above the strip.
+        begin, end, can_tell = 0, 0, True
+        for column in range(2 * left, 2 * right + 1):
+            if _has_side(starts, column - 2 * left):
+                can_tell &= _can_pass(walls, box, 2 * top, column)  # else it would depend on the raster
+                queue[end] = 2 * top, column
+                reached[2 * top, column] = number + 1
+                end += 1
 
-    # Where ways can lead.
-    can_pass = ndimage.binary_dilation(halves, np.ones((3, 3)))
-    upper_left, upper_right, lower_left, lower_right = free[:-1, :-1], free[:-1, 1:], free[1:, :-1], free[1:, 1:]
-    is_diagonal = (upper_left == lower_right) & (upper_right == lower_left) & (upper_left != upper_right)
-    can_pass[2:-2:2, 2:-2:2] &= ~is_diagonal
-    reached = ndimage.binary_dilation(starts, iterations=2 * (detour - 1), mask=can_pass | goals)
-    can_tell = not (starts & ~can_pass).any()  # else it would depend on the raster
-    return bool(starts.any() and goals.any() and can_tell and not (reached & goals).any())
+        # Ways from there, all by one step longer, until one gets to a free cell below.
+        is_near = False
+        for _ in range(most):
+            if not can_tell or is_near or begin == end:
+                break
+            for index in range(begin, end):
+                for down, aside in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+                    row, column = queue[index, 0] + down, queue[index, 1] + aside
+                    is_goal = (
+                        row == 2 * bottom and 2 * left <= column <= 2 * right and _has_side(goals, column - 2 * left)
+                    )
+                    is_near |= is_goal
+                    if reached[row, column] != number + 1 and _can_pass(walls, box, row, column):
+                        reached[row, column] = number + 1
+                        queue[end] = row, column
+                        end += 1
+                begin += 1
+        is_far[number] = can_tell and not is_near
+    return is_far
+
+
+@compiled
+def _has_side(free: np.ndarray, half: int) -> bool:
+    """Returns whether a half cell along a row of cells (`[W]` bool) is the middle or an end of a free one."""
+    if half % 2:
+        return bool(free[half // 2])
+    return bool((half > 0 and free[half // 2 - 1]) or (half // 2 < len(free) and free[half // 2]))
+
+
+@compiled
+def _can_pass(walls: np.ndarray, box: np.ndarray, row: int, column: int) -> bool:
+    """Returns whether ways lead through a place on the raster of half cells, where the strip in `box` is closed."""
+    free = [False, False, False, False]  # the cells around it: above on the left and right, and below
+    for index in range(4):
+        above = row // 2 - (row % 2 == 0 and index < 2)
+        before = column // 2 - (column % 2 == 0 and index % 2 == 0)
+        is_closed = box[0] <= above < box[2] and box[1] <= before < box[3]
+        free[index] = not walls[above, before] and not is_closed
+    is_diagonal = free[0] == free[3] and free[1] == free[2] and free[0] != free[1]
+    return (free[0] or free[1] or free[2] or free[3]) and not is_diagonal
