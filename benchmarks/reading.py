@@ -29,7 +29,7 @@ from mazebench.maps.readers.ros import read_occupancy
 _RADIUS, _NEAR = 0.15, 0.4  # m
 _LEAST_LOST = 2.0  # m2
 _ENLARGED = 4  # times, before a picture is turned
-_MOST_PIXELS = 10**8  # of a turned picture; larger ones are enlarged less
+_MOST_PIXELS = 3 * 10**7  # of a turned picture; larger ones are enlarged less
 
 
 def turned(grid: OccupancyGrid, degrees: float) -> OccupancyGrid:

@@ -73,14 +73,13 @@ class _Seen:
     """The pixels of a map as they lie, and the cells over them."""
 
     picture: OccupancyGrid
-    clear: np.ndarray  # [H, W] float, m to the nearest blocked pixel
-    cell_of: np.ndarray  # [H, W] int, row * C + column, -1 where no cell is
+    clear: np.ndarray  # [H, W] float, m to the nearest pixel that is not free
+    cell_of: np.ndarray  # [H, W] int, of free pixels row * C + column; -1 where no cell is
     is_turned: bool  # whether the cells are
 
-    def outside(self, walls: np.ndarray, cell_size: float) -> np.ndarray:
-        """Returns the free cells that lie outside of all walls: `[R, C]` bool."""
-        is_shown = np.bincount(self.cell_of[self.cell_of >= 0], minlength=walls.size).reshape(walls.shape) > 0
-        return outside_of(~walls, ~is_shown, cell_size)
+    def at(self, cells: np.ndarray) -> np.ndarray:
+        """Returns the values of the pixels' cells, `[R, C]` bool, True where no cell is: `[H, W]`."""
+        return np.append(cells.ravel(), True)[self.cell_of]
 
 
 def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: tuple[int, int]) -> np.ndarray:
@@ -188,13 +187,16 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     number, is_found = choose(areas, enclosed, options.area, cell_size)
     changes, lost = [], ""
     if pixels > 1:
-        seen = _Seen(picture, _clearance(picture, options), _cells_of_pixels(picture, part, cells), turn != 0)
-        walls = _with_ways(seen, cells.walls, areas, number, radius)
+        clear = _clearance(picture, dataclasses.replace(options, inflate=0.0))
+        seen = _Seen(picture, clear, _cells_of_pixels(picture, part, cells, clear > 0), turn != 0)
+        walls = _with_ways(seen, cells.walls, areas, number, options, radius)
         if num_opened := int((cells.walls & ~walls).sum()):
             count = f"{num_opened} cell{'s' * (num_opened > 1)}"
             changes.append(f"{count} opened where a body {2 * radius:g} m wide passes on the map")
         place = tuple(np.argwhere(areas[number].cells)[0])
-        outside = seen.outside(walls, cell_size) if areas[number].is_ground else np.zeros_like(walls)
+        outside = np.zeros_like(walls)
+        if areas[number].is_ground:
+            outside = outside_of(~walls, _beyond(picture, part, cells), cell_size)
         if options.area is not None and is_found:
             row, column = cell_of_place(options.area, len(enclosed[number].walls), cell_size)
             place = row + enclosed[number].row, column + enclosed[number].column
@@ -303,17 +305,27 @@ def _rim(picture: OccupancyGrid, part: OccupancyGrid, cell_size: float) -> Rim |
     return Rim(np.where(is_free, rows, -1), np.where(is_free, columns, -1)) if is_free.any() else None
 
 
-def _cells_of_pixels(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells) -> np.ndarray:
-    """Returns the cell of each pixel of a picture as row * C + column, -1 where there is none: `[H, W]` int.
+def _cells_of_pixels(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells, is_free: np.ndarray) -> np.ndarray:
+    """Returns the cell of each free pixel of a picture as row * C + column, -1 where there is none: `[H, W]` int.
 
     `part` is the map that the cells were laid on.
     """
-    height, width = picture.states.shape
-    rows, columns = _pixels_on(part, picture, np.arange(height)[:, None], np.arange(width)[None])
-    rows, columns = (rows - cells.down) // cells.pixels, (columns - cells.right) // cells.pixels
     num_rows, num_columns = cells.walls.shape
+    cell_of = np.full(picture.states.shape, -1, dtype=np.int32)
+    places = np.nonzero(is_free)
+    rows, columns = _pixels_on(part, picture, *places)
+    rows, columns = (rows - cells.down) // cells.pixels, (columns - cells.right) // cells.pixels
     is_laid = (rows >= 0) & (rows < num_rows) & (columns >= 0) & (columns < num_columns)
-    return np.where(is_laid, rows * np.int32(num_columns) + columns, np.int32(-1))
+    cell_of[places] = np.where(is_laid, rows * num_columns + columns, -1)
+    return cell_of
+
+
+def _beyond(picture: OccupancyGrid, part: OccupancyGrid, cells: Cells) -> np.ndarray:
+    """Returns the cells whose centre lies outside of a picture: `[R, C]` bool."""
+    rows, columns = (np.arange(count)[:, None] * cells.pixels + cells.pixels // 2 for count in cells.walls.shape)
+    rows, columns = _pixels_on(picture, part, rows + cells.down, columns.T + cells.right)
+    height, width = picture.states.shape
+    return np.asarray(~((rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)))
 
 
 def _clearance(picture: OccupancyGrid, options: ReadOptions) -> np.ndarray:
@@ -322,10 +334,13 @@ def _clearance(picture: OccupancyGrid, options: ReadOptions) -> np.ndarray:
     return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] * picture.resolution
 
 
-def _with_ways(seen: _Seen, walls: np.ndarray, areas: list[Area], number: int, radius: float) -> np.ndarray:
+def _with_ways(
+    seen: _Seen, walls: np.ndarray, areas: list[Area], number: int, options: ReadOptions, radius: float
+) -> np.ndarray:
     """Returns walls in which one of the areas is joined with what a body reaches from it, but not with the ground."""
-    area, positions = areas[number].cells, seen.clear > radius
-    if np.sum(positions & ~_grown(area).ravel()[seen.cell_of]) * seen.picture.resolution**2 < WORTH_REACHING:
+    area = areas[number].cells
+    positions = (_clearance(seen.picture, options) if options.inflate else seen.clear) > radius
+    if np.sum(positions & ~seen.at(_grown(area))) * seen.picture.resolution**2 < WORTH_REACHING:
         return walls
     nodes = nodes_of(positions, seen.cell_of, area.shape, seen.picture.resolution)
     least = (
@@ -365,10 +380,8 @@ def _describe_lost(
     It is empty if nothing that counts is lost. The ground around a building is not meant.
     """
     picture, area = seen.picture, areas[number].cells
-    is_near = _grown(area | _ground(areas, number)).ravel()[seen.cell_of]
-    kept = area.ravel()[seen.cell_of] & (seen.cell_of >= 0)
-    bare = dataclasses.replace(options, inflate=0.0)
-    clear = _clearance(picture, bare) if options.inflate else seen.clear
+    is_near = seen.at(_grown(area | _ground(areas, number)))
+    kept, clear = seen.at(area) & (seen.cell_of >= 0), seen.clear
     lost = lost_regions(clear, kept, is_near, picture.resolution, radius, _MANY_LOST)
     share = sum(region.area for region in lost) / (np.sum(clear > radius) * picture.resolution**2 + 1e-9)
     if not (any(region.width for region in lost) or share > _MANY_CLOSED):
@@ -395,7 +408,9 @@ def _describe_lost(
     }
     ways = [way for way, helps in advice.items() if helps and is_within_reach.any()]
     if options.unknown == "wall" and not is_within_reach.all():
-        through = reach_from(inside, _clearance(picture, dataclasses.replace(bare, unknown="free")) > radius, places)
+        through = reach_from(
+            inside, _clearance(picture, dataclasses.replace(options, inflate=0.0, unknown="free")) > radius, places
+        )
         ways += ["--unknown free"] * bool((through & ~is_within_reach).any())
     if options.pixel_size is not None and not is_within_reach.all():
         ways.append("without text, furniture and door swings on the plan")
