@@ -190,8 +190,8 @@ def pixels_of_track(track: str, size: int) -> int:
     if pixels * size > MAX_CONTEXT_SIZE:
         raise InputError(
             f"track {track!r}: expected mazes of at most {MAX_CONTEXT_SIZE // pixels} cells a side, "
-            f"whose maps have at most {MAX_CONTEXT_SIZE} pixels, found {size}; crop the map, or give a larger cell_size, "
-            f"up to {MAX_CELL_SIZE:g} m"
+            f"whose maps have at most {MAX_CONTEXT_SIZE} pixels, found {size}; crop the map, or give a larger "
+            f"cell_size, up to {MAX_CELL_SIZE:g} m"
         )
     return pixels * size
 
@@ -289,7 +289,8 @@ def _check_maze(asked: TaskOptions, maze: Maze, older: OlderMap | None = None) -
         widest = MAX_CONTEXT_SIZE // TRACKS[asked.track].pixels_per_cell * MAX_CELL_SIZE
         remedy = f"crop the map to {widest:g} m a side" if maze.side > widest else "give a smaller cell_size"
         raise InputError(
-            f"track {asked.track!r}: expected cells of at most {MAX_CELL_SIZE:g} m, found {maze.cell_size:g} m; {remedy}"
+            f"track {asked.track!r}: expected cells of at most {MAX_CELL_SIZE:g} m, "
+            f"found {maze.cell_size:g} m; {remedy}"
         )
     if len(maze.free_cells) < 2:
         raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
