@@ -60,7 +60,8 @@ def rollout(
         seed[begun] = seeds(begun)
         truth = None
         if needs_truth:  # where an environment rests, it is a maze without a goal
-            walls = np.stack([envs.task.mazes[episode.maze if episode else 0].walls for episode in envs.episodes])
+            mazes = np.where(envs.rules.active, envs.rules.maze, 0).tolist()
+            walls = np.stack([envs.task.mazes[maze].walls for maze in mazes])
             pose = np.column_stack([info["position"], info["yaw"]]).astype(np.float64)
             routes = zip(envs.episodes, envs.rules.routes, strict=True)
             goals = [route.goal if episode and route else (0, 0) for episode, route in routes]
