@@ -61,6 +61,7 @@ class Expert:
         self._mazes, self._body = mazes, body
         self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course
         self._arrays: tuple[np.ndarray, ...] = ()  # walls, ways left and goals of the courses
+        self._last: tuple[list[np.ndarray], np.ndarray] | None = None  # the last arguments of `costs`, and the answer
 
     def costs(self, maze: np.ndarray, goal: np.ndarray, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Returns the costs `[B, 6]` of the actions, in metres of way left; less is better.
@@ -71,6 +72,9 @@ class Expert:
           pose: `[B, 3]` float, true x and y (m) and yaw (rad).
           velocity: `[B, 2]` float, on the map, m/s.
         """
+        asked = [maze, goal, pose, velocity]
+        if self._last is not None and all(map(np.array_equal, asked, self._last[0])):
+            return self._last[1].copy()
         for slot, course in enumerate(zip(maze.tolist(), goal.tolist(), strict=True)):
             if self._courses[slot] != course:
                 self._courses[slot] = course
@@ -83,4 +87,6 @@ class Expert:
                     arrays[slot] = array
         walls, way_left, goals = self._arrays
         cell_size = self._mazes[0].cell_size
-        return costs_of_actions(Motion.of(self._body), walls, way_left, goals, cell_size, pose, velocity)
+        costs = costs_of_actions(Motion.of(self._body), walls, way_left, goals, cell_size, pose, velocity)
+        self._last = [array.copy() for array in asked], costs
+        return costs.copy()

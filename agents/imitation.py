@@ -16,13 +16,14 @@ import torch
 from annotated_types import Interval
 from torch.nn import functional
 
+from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import InputError
 from mazebench.storage.array_files import read_arrays
 from mazebench.tasks.task import Task
-from mazebench.training.experience import Experience
+from mazebench.training.experience import Experience, Scene
 
 from .common.actor import NetworkAgent
-from .common.config_values import Length
+from .common.config_values import Length, Share
 from .common.learner import REPLAY_FILE
 from .common.rollouts import RolloutConfig, RolloutLearner, Rows, Seen
 from .expert import Expert
@@ -32,13 +33,15 @@ from .expert import Expert
 class ImitationConfig(RolloutConfig):
     """The numbers of an imitation."""
 
+    oracle_drives: Share = 0.0  # in so many of the environments the oracle drives, in the others the agent
+    random_actions: Share = 0.25  # of the oracle's actions are replaced by random ones, so that it strays
     kept_rollouts: Length = 25  # that imitation learns from: on few of them, the network learns their mazes by heart
     # m; an action that leaves so much more way is e times less wanted.
     label_temperature: Annotated[float, Interval(ge=0.001, le=10.0)] = 0.08
 
 
 class ImitationLearner(RolloutLearner):
-    """Learns to choose what the oracle would choose in the states that its actor drives into."""
+    """Learns to choose what the oracle would choose in the states that its actor, or the oracle, drives into."""
 
     teacher = "the oracle"
     actor: ImitatingAgent
@@ -48,6 +51,16 @@ class ImitationLearner(RolloutLearner):
         super().__init__(actor, seed)
         self.num_kept = actor.config.kept_rollouts
         self._expert = Expert(task.mazes, actor.config.num_envs, task.body)
+
+    def driven(self, scene: Scene, actions: np.ndarray) -> np.ndarray:
+        """Returns the oracle's actions, some of them random, in the first environments, and the actor's in the rest."""
+        num_driven = round(self._config.oracle_drives * len(actions))
+        if not num_driven:
+            return actions
+        best = self._expert.costs(scene.maze, scene.goal, scene.pose, scene.velocity)[:num_driven].argmin(axis=1)
+        at_random = self.rng.random(num_driven) < self._config.random_actions
+        best = np.where(at_random, self.rng.integers(NUM_ACTIONS, size=num_driven), best)
+        return np.concatenate([best, actions[num_driven:]])
 
     def seen(self, experience: Experience) -> Seen:
         """Adds the oracle's label, the probabilities of actions by its look-ahead from the true state."""

@@ -36,6 +36,7 @@ def rollout(
     *,
     needs_truth: bool = False,
     explore: bool = False,
+    driven: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Iterator[Step]:
     """Lets an agent act in environments, and yields each step once it is taken, until no episode is left.
 
@@ -46,6 +47,7 @@ def rollout(
       seeds: returns the seeds `[K]` of the agent's own draws in the episodes that begin in the environments `[K]` int.
       needs_truth: whether the agent is given the true maze and pose.
       explore: whether the agent acts as in training.
+      driven: returns the actions that are taken, of those that the agent chose; by default these.
     """
     observation, info = first
     state = agent.initial_state(envs.num_envs)
@@ -58,7 +60,8 @@ def rollout(
         seed[begun] = seeds(begun)
         truth = None
         if needs_truth:  # where an environment rests, it is a maze without a goal
-            walls = np.stack([envs.task.mazes[episode.maze if episode else 0].walls for episode in envs.episodes])
+            mazes = np.where(envs.rules.active, envs.rules.maze, 0).tolist()
+            walls = np.stack([envs.task.mazes[maze].walls for maze in mazes])
             pose = np.column_stack([info["position"], info["yaw"]]).astype(np.float64)
             routes = zip(envs.episodes, envs.rules.routes, strict=True)
             goals = [route.goal if episode and route else (0, 0) for episode, route in routes]
@@ -67,6 +70,8 @@ def rollout(
 
         # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.
         actions, state = agent.act(inputs, state, explore)
+        if driven is not None:
+            actions = driven(actions)
         next_observation, reward, terminated, truncated, next_info = envs.step(actions)
         ended = terminated | truncated
         active = envs.rules.active.copy()

@@ -13,7 +13,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.storage.json_files import read_json
 from mazebench.tasks.task import Task
-from mazebench.training.experience import Experience
+from mazebench.training.experience import Experience, Scene
 
 from .actor import NetworkAgent
 from .checkpoint import AGENT_FILE, load_checkpoint, save_checkpoint
@@ -39,6 +39,10 @@ class NetworkLearner:
     def config(self) -> dict[str, Any]:
         """Returns all values of the config."""
         return dataclasses.asdict(self.actor.config)
+
+    def driven(self, scene: Scene, actions: np.ndarray) -> np.ndarray:
+        """Returns the actions that the actor chose."""
+        return actions
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes the agent, the optimizer with the target network if there is one, and the random generator."""

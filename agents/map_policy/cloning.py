@@ -32,11 +32,11 @@ class CloningLearner(ImitationLearner):
         return Seen(shared, (experience.maze, experience.pose, pose, velocity, label))
 
     def losses(self, rows: Rows) -> dict[str, torch.Tensor]:
-        """Returns the losses of rows in the world turned by a symmetry, as if the drives had been in another maze."""
+        """Returns the losses of rows, each map turned by a symmetry, as if the drives had been in another maze."""
         maze, true_pose, pose, velocity, label = rows.parts
         pictures = self._pictures(rows, maze.numpy(), true_pose.numpy())
-        parts = turned(int(self.rng.integers(NUM_SYMMETRIES)), rows.shared, pose, velocity, pictures, label)
-        return super().losses(Rows(parts[0], rows.group, parts[1:]))
+        symmetry = self.rng.integers(NUM_SYMMETRIES, size=len(rows.shared))
+        return super().losses(turned(symmetry, rows._replace(parts=(pose, velocity, pictures, label))))
 
     def _pictures(self, rows: Rows, maze: np.ndarray, pose: np.ndarray) -> torch.Tensor:
         """Returns pictures `[R, 64, 64, 3]` uint8 in one of the two looks."""
@@ -52,20 +52,23 @@ class CloningLearner(ImitationLearner):
         )
 
 
-def turned(
-    symmetry: int,
-    maps: torch.Tensor,
-    pose: torch.Tensor,
-    velocity: torch.Tensor,
-    pictures: torch.Tensor,
-    label: torch.Tensor,
-) -> tuple[torch.Tensor, ...]:
-    """Returns maps `[G, 2, L, L]` and what `R` states on them have, in the world turned by `common.symmetry`."""
-    size, (x, y, yaw), (forward, left) = maps.shape[-1], pose.unbind(1), velocity.unbind(1)
-    if symmetry >= 4:
-        x, yaw, left, pictures = size - x, torch.pi - yaw, -left, pictures.flip(2)
-    for _ in range(symmetry % 4):
-        x, y, yaw = size - y, x, yaw + torch.pi / 2
-    label = label[:, turn_actions(np.arange(NUM_ACTIONS), symmetry)]
-    seen = torch.stack([x, y, yaw], dim=1), torch.stack([forward, left], dim=1)
-    return turn_planes(maps, symmetry), *seen, pictures, label
+def turned(symmetry: np.ndarray, rows: Rows) -> Rows:
+    """Returns rows in the world turned by the symmetries `[G]` (see `common.symmetry`) of their maps `[G, 2, L, L]`.
+
+    The parts of rows are poses, velocities, pictures and labels.
+    """
+    pose, velocity, pictures, label = rows.parts
+    size, (x, y, yaw), (forward, left) = rows.shared.shape[-1], pose.unbind(1), velocity.unbind(1)
+    of_row = torch.from_numpy(symmetry)[rows.group]
+    is_mirrored = of_row >= 4
+    x, yaw, left = (torch.where(is_mirrored, *each) for each in ((size - x, x), (torch.pi - yaw, yaw), (-left, left)))
+    for turn in range(1, 4):
+        is_turned = of_row % 4 >= turn
+        x, y = torch.where(is_turned, size - y, x), torch.where(is_turned, x, y)
+        yaw = torch.where(is_turned, yaw + torch.pi / 2, yaw)
+    pictures = torch.where(is_mirrored[:, None, None, None], pictures.flip(2), pictures)
+    label = torch.where(is_mirrored[:, None], label[:, turn_actions(np.arange(NUM_ACTIONS), symmetry=4)], label)
+    maps = torch.stack([turn_planes(each, turn) for each, turn in zip(rows.shared, symmetry.tolist(), strict=True)])
+    return Rows(
+        maps, rows.group, (torch.stack([x, y, yaw], dim=1), torch.stack([forward, left], dim=1), pictures, label)
+    )

@@ -106,7 +106,10 @@ class TaskRunner:
 
     def after_step(self, simulation: Simulation) -> None:
         """Takes note of what the action led to."""
-        self.rules.advance(simulation.data.qpos[None], _RUNNING)
+        if self.rules.advance(simulation.data.qpos[None], _RUNNING):  # other walls around the same body
+            state = simulation.full_state()
+            simulation.surround(self.rules.maze.item(), self.rules.cell.item())
+            simulation.set_full_state(state)
         if self.rules.is_first.item():
             simulation.place_goal(self.rules.marker[0, :2])
 

@@ -200,7 +200,9 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # Apply the rules of the task.
         rules = self.rules
-        rules.advance(self._qpos, running)
+        if changed := rules.advance(self._qpos, running):  # other walls around the same bodies
+            self._surround()
+            self._batch.forward(np.array(changed), stage=_VELOCITY_STAGE)
         self._marker[:, 0] = rules.marker
         terminated, truncated = rules.reached.copy(), rules.timed_out.copy()
         rewards = rules.rewards()

@@ -11,9 +11,9 @@ from mazebench.maps.kinds import KINDS
 from mazebench.maps.maze import Cell
 from mazebench.maps.real_buildings import ORIGINS
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode, episode_level
+from mazebench.tasks.episode import Episode, episode_level, perturbations_of
 from mazebench.tasks.observation import Noise, OpenSensors, state_errors
-from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
+from mazebench.tasks.perturbations.perturbation import Of, ShownMap, Standing, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.task import Task
@@ -97,6 +97,7 @@ class Rules:
         self.routes: list[Route | None] = [None] * num_envs
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._noise: list[Noise] = [self._sensors.begin(None)] * num_envs
+        self._standing: dict[int, list[Standing]] = {}  # of the episodes in which the building changes
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
         texts = "", task.options.track or ""
         self.kind, self.track = (np.full(num_envs, text, dtype=object).view(Names) for text in texts)
@@ -130,6 +131,7 @@ class Rules:
         self.episodes[i], self.active[i] = episode, episode is not None
         self.is_first[i] = self.reached[i] = self.timed_out[i] = self.goal_reached[i] = False
         self._state_errors[i], self._noise[i] = [], self._sensors.begin(episode)
+        self._standing.pop(i, None)
         if episode is None:
             return
 
@@ -138,6 +140,9 @@ class Rules:
         self.shown[i] = shown = show_map(task, episode)
         self.routes[i] = route = plan_route(task, episode, shown)
         self._state_errors[i] = state_errors(task, episode)
+        changes = (each.standing(rng) for each, rng in perturbations_of(task, episode, Of.BUILDING))
+        if standing := [change for change in changes if change is not None]:
+            self._standing[i] = standing
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
         self.level[i] = 0 if task.options.track is None else episode_level(task, episode)
@@ -169,12 +174,19 @@ class Rules:
         self.time_limit[i], self._deadline[i] = route.time_limit, route.deadline
         self.landmark[i] = route.leg
 
-    def advance(self, poses: np.ndarray, running: np.ndarray) -> None:
+    def advance(self, poses: np.ndarray, running: np.ndarray) -> list[int]:
         """Takes note of an agent step after which the bodies have `poses` (`[B, 3]`: x, y, yaw).
 
         Afterwards, `is_first`, `reached` and `timed_out` (`[B]` bool) say where the step began a new leg, reached the
         goal, or used up the time. It was taken where `running` (`[B]` bool); elsewhere the body must not have moved.
+
+        Returns the environments in which another maze stands from now on.
         """
+        self._move(poses, running)
+        return self._change(running) if self._standing else []
+
+    def _move(self, poses: np.ndarray, running: np.ndarray) -> None:
+        """Takes note of where the bodies are, and of what that led to."""
         if len(poses) == 1 and running.item():  # plain numbers take a fourth of the time of arrays
             self._move_one(poses[0])
             return
@@ -238,6 +250,23 @@ class Rules:
             if self.task.options.num_goals > 1:
                 self._seek(i, route, shown)
             self._begin_leg(i, route, shown)
+
+    def _change(self, running: np.ndarray) -> list[int]:
+        """Exchanges the mazes of buildings that change now, and measures the ways in them; returns where."""
+        changed = []
+        for i, standing in self._standing.items():
+            if not running[i]:
+                continue
+            before, cell = self.maze.item(i), divmod(self.cell.item(i), self.task.size)
+            for stands in standing:
+                self.maze[i] = stands(self.steps.item(i), self.maze.item(i), cell)
+            if self.maze[i] == before:
+                continue
+            changed.append(i)
+            if self._ways[i] is not None and (route := self.routes[i]) is not None:
+                self._ways[i] = ways = self.task.mazes[self.maze[i]].distances(route.goal).ravel()
+                self.way_left[i] = ways[self.cell[i]]
+        return changed
 
     def rewards(self) -> np.ndarray:
         """Returns the rewards `[B]` float32 of the last step."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.rollout import rollout
 from mazebench.tasks.task import Task
-from mazebench.training.experience import Experience
+from mazebench.training.experience import Experience, Scene
 from mazebench.training.protocol import LearningAgent
 
 _SEEDS = 2**31
@@ -28,16 +28,29 @@ class Collector:
         distances = self._task.options.distances or ()
         self._envs.draw_distances([each for each in distances if each <= longest] or [min(distances)])
 
-    def collect(self, actor: LearningAgent, seed: int) -> Iterator[Experience]:
-        """Begins new trajectories, the same for the same `seed`, and yields the exploring agent's steps without end."""
+    def collect(
+        self,
+        actor: LearningAgent,
+        seed: int,
+        driven: Callable[[Scene, np.ndarray], np.ndarray] = lambda scene, actions: actions,
+    ) -> Iterator[Experience]:
+        """Begins new trajectories, the same for the same `seed`, and yields the exploring agent's steps without end.
+
+        `driven` is `Learner.driven`; by default the agent drives.
+        """
         root = np.random.SeedSequence(seed)
         first = self._envs.reset(seed=root.generate_state(self._envs.num_envs).tolist())
         # What an agent draws from must not let it reconstruct its episode's flips, warp or noise.
         rng = np.random.default_rng(root.spawn(1)[0])
         actor.explore_from(seed)
-        truth = self._truth()
+        scene = self._scene()
         for step in rollout(
-            actor, self._envs, first, lambda slots: rng.integers(_SEEDS, size=len(slots)), explore=True
+            actor,
+            self._envs,
+            first,
+            lambda slots: rng.integers(_SEEDS, size=len(slots)),
+            explore=True,
+            driven=lambda actions: driven(self._scene(), actions),
         ):
             observation = step.inputs.observation
             final_state = np.zeros_like(observation["state"])
@@ -47,9 +60,9 @@ class Collector:
                     final_state[slot] = step.next_info["final_obs"][slot]["state"]
                 # All mazes have one size and one cell size.
                 final_cell = self._task.mazes[0].cell_index(step.next_info["final_info"]["position"])
-            before, truth = truth, self._truth()
+            before, scene = scene, self._scene()
             yield Experience(
-                **before,
+                **before._asdict(),
                 state=observation["state"],
                 action=step.actions,
                 new_episode=step.inputs.new_episode,
@@ -65,14 +78,10 @@ class Collector:
                 notes=actor.notes(step.state),
             )
 
-    def _truth(self) -> dict[str, np.ndarray]:
-        """Returns what is true of the environments now, by the names of the fields of `Experience`."""
-        rules = self._envs.rules
-        return {
-            "cell": rules.cell.copy(),
-            "pose": rules.pose.copy(),
-            "velocity": self._envs.velocity(),
-            "maze": rules.maze.copy(),
-            "start": rules.start.copy(),
-            "goal": rules.target.copy(),
-        }
+    def _scene(self) -> Scene:
+        """Returns the truth of the environments now."""
+        rules, velocity = self._envs.rules, self._envs.velocity()
+        cell, pose, maze, start, goal = (
+            array.copy() for array in (rules.cell, rules.pose, rules.maze, rules.start, rules.target)
+        )
+        return Scene(cell, pose, velocity, maze, start, goal)

@@ -12,6 +12,17 @@ import numpy as np
 from mazebench.agent import Observation
 
 
+class Scene(NamedTuple):
+    """The truth of B environments before a step, by the names that `Experience` has for it."""
+
+    cell: np.ndarray
+    pose: np.ndarray
+    velocity: np.ndarray
+    maze: np.ndarray
+    start: np.ndarray
+    goal: np.ndarray
+
+
 class Experience(NamedTuple):
     """One agent step in B environments.
 

@@ -9,9 +9,11 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol, Self
 
+import numpy as np
+
 from mazebench.agent import Agent, Interface
 from mazebench.tasks.task import Task
-from mazebench.training.experience import Experience
+from mazebench.training.experience import Experience, Scene
 
 
 class LearningAgent(Agent):
@@ -97,6 +99,9 @@ class Learner(Protocol):
 
     def description(self) -> str:
         """Returns one line for people: the size of the network and of the replay."""
+
+    def driven(self, scene: Scene, actions: np.ndarray) -> np.ndarray:
+        """Returns the actions `[B]` that are taken where the actor chose `actions`, before each step is observed."""
 
     def observe(self, experience: Experience) -> None:
         """Stores one step in all environments."""

@@ -18,6 +18,10 @@ from mazebench.tasks.streams import Stream
 # object that can be copied and pickled in the middle of an episode, so a function inside of another one will not do.
 StateError = Callable[[np.ndarray], None]
 
+# Returns the index of the task's maze that stands after an agent step (1 is the first) that left the body in a cell of
+# the maze with an index. It is called once for each step of one episode, and is an object that can be copied likewise.
+Standing = Callable[[int, int, Cell], int]
+
 
 class Drawing(abc.ABC):
     """A drawing of a map of N x N cells: a picture of P x P pixels, in which cells need not lie on a grid."""
@@ -85,6 +89,7 @@ class Perturbation:
 
     - `shown`: the map that is shown, in a maze that is the true building. Called once an episode.
     - `building`: the true building, of a maze of a user's own that is its plan. Called when the mazes are read.
+    - `standing`: the maze that stands after each step, for a building that changes. Called once an episode.
     - `observed`: the error of the observed states. Called once an episode.
     """
 
@@ -105,6 +110,13 @@ class Perturbation:
           InputError: if the plan can't be changed so.
         """
         return plan
+
+    def standing(self, rng: np.random.Generator) -> Standing | None:
+        """Returns what tells the maze after each step of an episode that begins; None if it stays.
+
+        All mazes of a task have one size. A wall must not come to stand where the body is.
+        """
+        return None
 
     def observed(self, rng: np.random.Generator) -> StateError | None:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""
