@@ -1,6 +1,6 @@
 """Shows that today's code of agents gives the episodes that earlier code gave, as `records/` has them.
 
-    python -m benchmarks.equal_code ARCHIVE...      such as tracks; of all agents in an archive that learn nothing
+    python -m benchmarks.equal_code FOLDER...      of an archive, such as tracks/navigator; agents that learn nothing
 
 An episode in each maze is played again: with the same steps and path, the hashes of both versions of the code go to
 `benchmarks/equal_code.json`. Columns of one table may be of different code only if they stand there together.
@@ -13,6 +13,7 @@ import pathlib
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping
 
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.results.reading import SUMMARY, Result, load_result
@@ -28,9 +29,20 @@ def equal_code() -> dict[str, list[list[str]]]:
     return json.loads(LIST.read_text("ascii"))
 
 
-def are_equal(agent: str, hashes: set[str]) -> bool:
-    """Returns whether versions of an agent's code were shown to give equal episodes."""
-    return len(hashes) == 1 or any(hashes <= set(group) for group in equal_code().get(agent, []))
+def is_one_code(played: Mapping[str, set[str]]) -> bool:
+    """Returns whether all agents of `played`, with the hashes of the code that they were played by, share a version.
+
+    A version is shared if each agent's episodes were shown to be equal by it.
+    """
+    groups = equal_code()
+    known = [
+        {version for group in groups.get(agent, []) if hashes <= set(group) for version in group} | hashes
+        for agent, hashes in played.items()
+    ]
+    return bool(set.intersection(*known)) and all(
+        len(hashes) == 1 or any(hashes <= set(group) for group in groups.get(agent, []))
+        for agent, hashes in played.items()
+    )
 
 
 def played_again(result: Result) -> str:
@@ -56,12 +68,13 @@ def _key(record: Record) -> tuple[object, ...]:
     return record.maze, record.start, record.goal, record.leg, record.seed
 
 
-def main(archives: list[str]) -> None:
+def main(folders: list[str]) -> None:
     groups = equal_code() if LIST.exists() else {}
-    for archive in archives:
+    for name in folders:
+        archive = name.partition("/")[0]
         with tempfile.TemporaryDirectory() as folder:
             shutil.unpack_archive(_RECORDS / f"{archive}.tar.xz", folder, filter="data")
-            for path in sorted(pathlib.Path(folder).rglob(SUMMARY)):
+            for path in sorted(pathlib.Path(folder, name).rglob(SUMMARY)):
                 result = load_result(path.parent)
                 summary = result.summary
                 if summary.provenance.checkpoint_sha256 or summary.task.track is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import hashlib
 import json
 import re
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 
 import mazebench
+from benchmarks.equal_code import is_one_code
 from benchmarks.results.kept import Kept, keep, read_kept
 from benchmarks.results.results_tables import PAGES, RECORDS, ROOT, with_tables
 from mazebench.agent_loading import load_agent_class
@@ -66,6 +68,18 @@ def test_every_agent_of_a_record_can_be_loaded(archives, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "docs" / "examples")
     for agent in set.union(*(agents for _, agents in archives.values())):
         load_agent_class(agent)
+
+
+def test_columns_of_the_ceilings_are_of_code_that_was_shown_equal():
+    played = collections.defaultdict(set)
+    for name in ("tracks", "tracks-no-map", "tracks-true-pose", "ceilings"):
+        with tarfile.open(RECORDS / f"{name}.tar.xz") as archive:
+            summaries = [json.load(archive.extractfile(each)) for each in archive if each.name.endswith("summary.json")]
+        for summary in summaries:
+            if summary["agent"].startswith("navigator"):
+                played[summary["agent"]].add(summary["provenance"]["agent_code_sha256"])
+    assert set(played) == {"navigator", "navigator-told"}
+    assert is_one_code(played)
 
 
 def test_every_archive_has_a_command(archives):
