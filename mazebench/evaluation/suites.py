@@ -70,6 +70,13 @@ def _each_level(
     )
 
 
+def _by_camera_in_real_buildings(split: str) -> tuple[Part, ...]:
+    """Returns a part for each frozen real building with the right map, by camera alone."""
+    chosen = (each for each in buildings().values() if (each.split, each.setting) == (split, RIGHT))
+    tasks = (TaskOptions(task=BUILDING, level=(1,), mazes=f"{PREFIX}{each.name}", **_CAMERA) for each in chosen)
+    return tuple(Part(f"{RIGHT}{OF}{task.mazes.removeprefix(PREFIX)}", task) for task in tasks)
+
+
 def _in_real_buildings(split: str) -> tuple[Part, ...]:
     """Returns a part for each frozen real building and map that is shown of it; the settings follow each other.
 
@@ -129,6 +136,7 @@ SUITES: dict[str, tuple[Part, ...]] = {
     # Frozen real buildings: what old maps and right maps are worth there.
     "real": _in_real_buildings("eval"),
     "real-dev": _in_real_buildings(DEV),
+    "real-camera": _by_camera_in_real_buildings("eval"),
     "llm": _in_words(),
     "llm-dev": _in_words(split=DEV),
 }

@@ -135,7 +135,7 @@ def _find_farthest(maze: Maze, joined: np.ndarray | None, start: Cell | None, go
     if start is not None and goal is not None:
         return maze.distance(start, goal)
     given = start or goal
-    if joined is None:
+    if joined is None or joined.sum() == len(maze.free_cells):
         return maze.diameter if given is None else int(maze.distances(given).max())
 
     # Among the cells that are joined on the older map; a lower bound by a double sweep if no end is given.
