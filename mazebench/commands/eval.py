@@ -37,8 +37,8 @@ def evaluate(
             "at all levels; tracks-dev, in the mazes to choose agents by; tracks-no-map, with the map hidden; "
             "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
             "tracks-camera and tracks-camera-dev, by camera alone; tracks-goals and tracks-goals-dev, three goals in "
-            "a row where doors have moved; real and real-dev, real buildings with right, changed, old and no maps; real-camera, by camera alone; "
-            "llm and llm-dev, a few episodes, for agents whose answers cost."
+            "a row where doors have moved; real and real-dev, real buildings with right, changed, old and no maps; "
+            "real-camera, by camera alone; llm and llm-dev, a few episodes, for agents whose answers cost."
         ),
     ] = None,
     out: Annotated[
