@@ -24,6 +24,7 @@ from numba.core.event import Listener, register
 from numba.extending import register_jitable
 
 from mazebench.errors import remark
+from mazebench.storage.cache import users_cache
 
 _CONFIG: Any = numba.config
 _IMPORT = re.compile(rb"^(from|import) .*\bkernels\b", re.MULTILINE)  # in the files of kernels
@@ -76,10 +77,9 @@ def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
 
     It lies in NUMBA_CACHE_DIR, in `beside`, or in the user's cache.
     """
-    users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     # Not what numba read in the working folder's .numba_config.yaml: it unpickles what lies in the folder.
     given = os.environ.get("NUMBA_CACHE_DIR", "")
-    for parent in (*([pathlib.Path(given)] if given else []), beside, pathlib.Path(users) / "mazebench"):
+    for parent in (*([pathlib.Path(given)] if given else []), beside, users_cache()):
         folder = parent / f"kernels-{digest}"
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # of each worker of pytest-xdist and its processes; read by imports below
+os.environ.setdefault("MAZEBENCH_NO_CACHE", "1")  # no test reads what another run has kept
 
 import numpy as np
 import pytest

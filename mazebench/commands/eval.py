@@ -13,7 +13,7 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import takes_options
+from mazebench.commands.option_parameters import NoCache, takes_options
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions, RunOptions
 from mazebench.options import fields_of, options_in
@@ -47,6 +47,7 @@ def evaluate(
     show_traceback: Annotated[
         bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers.")
     ] = False,
+    no_cache: NoCache = False,  # its callback does it
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
     from mazebench.evaluation.checked_agent import AgentError

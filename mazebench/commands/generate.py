@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import takes_options
+from mazebench.commands.option_parameters import NoCache, takes_options
 from mazebench.maps.maze_options import ReadOptions
 
 
@@ -49,6 +49,7 @@ def generate(
             "episodes at 1, 2 and 3.",
         ),
     ] = None,
+    no_cache: NoCache = False,  # its callback does it
 ) -> None:
     """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
     load_mujoco(renders=False)

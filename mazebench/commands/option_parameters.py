@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import functools
 import inspect
+import os
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any
 
@@ -12,8 +13,20 @@ import typer
 
 from mazebench.errors import InputError
 from mazebench.options import Option, as_tuple, fields_of, options_in
+from mazebench.storage.cache import NO_CACHE
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
+
+
+def _leave_out_cache(asked: bool) -> None:
+    if asked:
+        os.environ[NO_CACHE] = "1"  # for the processes of workers, too
+
+
+NoCache = Annotated[
+    bool,
+    typer.Option("--no-cache", callback=_leave_out_cache, help="Keep no changed buildings on disk, and read none."),
+]
 
 
 def takes_options(

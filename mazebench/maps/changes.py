@@ -13,6 +13,8 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import pathlib
+import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -26,6 +28,7 @@ from mazebench.maps.follower import follow
 from mazebench.maps.maze import Maze
 from mazebench.maps.passages import Passage, find_passages
 from mazebench.maps.search import search
+from mazebench.storage import cache
 
 LATE = (
     0.15,
@@ -43,6 +46,8 @@ _NUM_PAIRS = 600  # on which lateness is measured, with a standard error of at m
 _MISS = 0.03  # by which lateness on these pairs may miss that of a strength
 _NUM_TRIES, _NUM_MISSES = 8, 7  # of a strength, and of changes in a row that a try does not keep
 _CELL = 1e-6  # cells, a tolerance
+_KEPT_FROM = 2.0  # s of CPU to make a change, which is then kept on disk
+_CODE = ("changes.py", "passages.py", "follower.py", "search.py", "sight.py", "../constants.py")  # that makes changes
 
 
 class _Drives(NamedTuple):
@@ -57,12 +62,13 @@ class Change(NamedTuple):
     """The changes in a building since its plan was drawn, or a draft of them, and their cost."""
 
     walls: np.ndarray  # [N, N] bool
-    is_left: np.ndarray  # [Q] bool: the passages of the plan that may still change
-    things: tuple[tuple[tuple[slice, ...], np.ndarray], ...]  # furniture of the plan that is left: its box and shape
     done: tuple[str, ...] = ()  # a passage was "closed" or "opened", a piece of furniture "added" or "removed"
     late: float = 0.0  # share of late episodes of a robot that believes the plan
     late_without_map: float = 0.0  # of one that takes for free what it has not seen
     blocked: float = 0.0  # share of those in which the shortest way on the plan is blocked
+    # Of drafts only.
+    is_left: np.ndarray = np.zeros(0, dtype=bool)  # [Q]: the passages of the plan that may still change
+    things: tuple[tuple[tuple[slice, ...], np.ndarray], ...] = ()  # furniture of the plan: its box and shape
     drives: _Drives | None = None  # on which `late` was measured
 
     def __str__(self) -> str:
@@ -84,6 +90,7 @@ def changed(maze: Maze, strength: int, rng: np.random.Generator) -> Maze:
 
     Passages of up to 2.4 m are closed, doors are opened in walls, and furniture comes and goes. The building has the
     cells of the old map, their size and its kind. The changes of a larger strength begin with those of a smaller one.
+    A building that took over 2 s of CPU is kept in the user's cache, unless MAZEBENCH_NO_CACHE is set.
 
     Args:
       maze: the old map.
@@ -122,18 +129,35 @@ def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> tu
         raise InputError(f"expected a strength of 1 to 3, found {strength!r}")
     if not isinstance(rng, np.random.Generator):
         raise InputError(f"expected rng as a numpy.random.Generator, found {type(rng).__name__}")
-    plan = _Plan(maze, seed=int(rng.integers(2**63)))
-    late = plan.late_without_map(maze.walls)
+    seed = int(rng.integers(2**63))
+    code = (pathlib.Path(__file__).parent / each for each in _CODE)
+    asked = np.packbits(maze.walls).tobytes(), maze.cell_size, int(strength), seed
+    file = cache.file_for("changed-buildings", code, *asked)
+    if kept := cache.load(file):
+        walls = np.unpackbits(kept["walls"], count=maze.walls.size).reshape(maze.walls.shape).astype(bool)
+        found = Change(walls, tuple(kept["done"].tolist()), *kept["shares"].tolist())
+    else:
+        began = time.process_time()
+        found = _make(_Plan(maze, seed), strength)
+        if time.process_time() - began >= _KEPT_FROM:
+            shares = np.array([found.late, found.late_without_map, found.blocked])
+            cache.keep(file, walls=np.packbits(found.walls), done=np.array(found.done, dtype=str), shares=shares)
+    return dataclasses.replace(maze, walls=found.walls, name=name), found
+
+
+def _make(plan: _Plan, strength: int) -> Change:
+    """Returns the change of a plan; raises `InputError` if it can't carry the strength."""
+    late = plan.late_without_map(plan.walls)
     if late < LATE_IN_PLAN:
         raise InputError(
-            f"{maze.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
+            f"{plan.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
             f"of the episodes, and before it has changed in at least {LATE_IN_PLAN}; found {late:.2f}"
         )
     found = plan.unchanged()
     for each in range(1, strength + 1):
         found = _changed_more(plan, found, each)
-    found = found._replace(blocked=float(plan.is_blocked(found.walls).mean()))
-    return dataclasses.replace(maze, walls=found.walls, name=name), found
+    blocked = float(plan.is_blocked(found.walls).mean())
+    return Change(found.walls, found.done, found.late, found.late_without_map, blocked)
 
 
 class _Strips:
@@ -190,7 +214,7 @@ class _Plan:
         boxes = enumerate(scipy.ndimage.find_objects(areas), start=1)
         most = FURNITURE[1] / self.cell_size + _CELL
         things = [(box, areas[box] == area) for area, box in boxes if max(areas[box].shape) <= most]
-        return Change(self.walls, np.ones(len(self.strips.boxes), dtype=bool), tuple(things))
+        return Change(self.walls, is_left=np.ones(len(self.strips.boxes), dtype=bool), things=tuple(things))
 
     @functools.cached_property
     def strips(self) -> _Strips:
