@@ -30,19 +30,16 @@ def equal_code() -> dict[str, list[list[str]]]:
 
 
 def is_one_code(played: Mapping[str, set[str]]) -> bool:
-    """Returns whether all agents of `played`, with the hashes of the code that they were played by, share a version.
+    """Returns whether one version of the code gives the episodes of all agents, as far as was shown.
 
-    A version is shared if each agent's episodes were shown to be equal by it.
+    Args:
+      played: by agent, the hashes of the code that its episodes were played by.
     """
-    groups = equal_code()
-    known = [
-        {version for group in groups.get(agent, []) if hashes <= set(group) for version in group} | hashes
-        for agent, hashes in played.items()
-    ]
-    return bool(set.intersection(*known)) and all(
-        len(hashes) == 1 or any(hashes <= set(group) for group in groups.get(agent, []))
-        for agent, hashes in played.items()
-    )
+    groups, versions = equal_code(), []
+    for agent, hashes in played.items():
+        found = (set(group) for group in groups.get(agent, []) if hashes <= set(group))
+        versions.append(next(found, hashes if len(hashes) == 1 else set()))
+    return bool(set.intersection(*versions))
 
 
 def played_again(result: Result) -> str:

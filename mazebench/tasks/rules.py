@@ -32,7 +32,7 @@ _INFOS = (  # what `Rules.infos` describes, in this order
 class Names(np.ndarray):
     """An array of kinds or tracks as text, which libraries that have no texts take by DLPack as their numbers.
 
-    The number is the index in `NAMES`, from 0 for "".
+    The number is the index in `NAMES`, from 0 for "", and -1 for other names.
     """
 
     NAMES = ("", *KINDS, *ORIGINS, *TRACKS)
@@ -40,7 +40,8 @@ class Names(np.ndarray):
     def __dlpack__(self, **options: Any) -> Any:
         if self.dtype != object:  # what was computed of names
             return super().__dlpack__(**options)
-        return np.array([self.NAMES.index(name) for name in self.flat]).reshape(self.shape).__dlpack__(**options)
+        numbers = {name: number for number, name in enumerate(self.NAMES)}
+        return np.array([numbers.get(name, -1) for name in self.flat]).reshape(self.shape).__dlpack__(**options)
 
 
 @overload
