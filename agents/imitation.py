@@ -28,6 +28,8 @@ from .common.learner import REPLAY_FILE
 from .common.rollouts import RolloutConfig, RolloutLearner, Rows, Seen
 from .expert import Expert
 
+DriveSteps = Annotated[int, Interval(ge=0, le=1000)]
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ImitationConfig(RolloutConfig):
@@ -35,6 +37,8 @@ class ImitationConfig(RolloutConfig):
 
     oracle_drives: Share = 0.0  # in so many of the environments the oracle drives, in the others the agent
     random_actions: Share = 0.25  # of the oracle's actions are replaced by random ones, so that it strays
+    # Agent steps after which new episodes begin, 0 for none: drives to the end show few maps, and few states far away.
+    drive_steps: DriveSteps = 0
     kept_rollouts: Length = 25  # that imitation learns from: on few of them, the network learns their mazes by heart
     # m; an action that leaves so much more way is e times less wanted.
     label_temperature: Annotated[float, Interval(ge=0.001, le=10.0)] = 0.08
@@ -49,7 +53,8 @@ class ImitationLearner(RolloutLearner):
     def __init__(self, actor: ImitatingAgent, task: Task, seed: int):
         """The oracle knows the true mazes of `task`."""
         super().__init__(actor, seed)
-        self.num_kept = actor.config.kept_rollouts
+        self.num_kept, self.drive_steps = actor.config.kept_rollouts, actor.config.drive_steps
+        self.num_ahead = 0 if self.drive_steps else 1  # no step of a drive that is cut goes with those of another one
         self._expert = Expert(task.mazes, actor.config.num_envs, task.body)
 
     def driven(self, scene: Scene, actions: np.ndarray) -> np.ndarray:

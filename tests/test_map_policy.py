@@ -98,6 +98,20 @@ def test_its_share_of_random_actions_makes_the_oracle_stray():
     assert 0.3 < (actions != labels).mean() < 0.7
 
 
+def test_an_update_learns_from_whole_drives_that_were_cut():
+    """Each of two rollouts has five states on each of eight maps, but where an episode reached its goal."""
+    task = Task.of("building", split="train", sensors="egocentric", distances=(20,))
+    values = {"num_envs": "8", "rollout_steps": "5", "drive_steps": "5", "epochs": "1", "minibatches": "1"}
+    learner = MapPolicy.build_learner(task, overrides=values)
+    steps = Collector(task, 8).collect(learner.actor, 0, learner.driven, learner.drive_steps)
+    for _ in range(2):
+        for _ in range(5):
+            learner.observe(next(steps))
+        assert learner.num_rows == 40
+        learner.update()
+        assert learner.num_rows == 0
+
+
 def test_the_checkpoint_that_ships_does_what_the_oracle_does():
     """In more than half of the states of its own drives."""
     task = Task.of("building", split="train", sensors="egocentric", distances=(5, 15))

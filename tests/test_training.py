@@ -259,6 +259,23 @@ def test_collector_gives_trajectories_that_hang_together():
     assert legs > sum(int(step.new_episode.sum()) for step in steps) > 4, "several goals an episode, several episodes"
 
 
+def test_drives_that_are_cut_end_where_the_body_is():
+    """After every five steps, in all four environments, some of which reach a goal before."""
+    task = Task.of(mazes=field(7), distances=(1, 2))
+    steps = list(itertools.islice(Collector(task, 4).collect(RandomActor(), seed=1, drive_steps=5), 40))
+    for number, (before, after) in enumerate(itertools.pairwise(steps), 1):
+        np.testing.assert_array_equal(after.new_episode, before.ended)
+        is_cut = number % 5 == 0
+        assert before.ended.all() == is_cut
+        ended, x, y = before.ended, before.final_state[:, 0], before.final_state[:, 1]
+        np.testing.assert_array_equal(before.final_cell[ended], ((6 - np.floor(y)) * 7 + np.floor(x))[ended])
+        moved = np.hypot(x - before.state[:, 0], y - before.state[:, 1])
+        assert (moved[ended] < 1).all()
+    assert any(step.terminated.any() for step in steps)
+    cut = [step for step in steps if step.ended.all()]
+    assert not any(step.terminated.all() for step in cut)
+
+
 class Witness(RandomActor):
     """Explores at random; what it notes of a step is the seeds that it was given."""
 

@@ -29,6 +29,8 @@ REPLAY_FILE = "replay.npz"
 class NetworkLearner:
     """The parts of every learner: an actor, gradient steps of its network, and a random stream."""
 
+    drive_steps = 0
+
     def __init__(self, actor: NetworkAgent, seed: int, descent: Descent):
         """`descent` is of the actor's network."""
         self.actor = actor

@@ -78,6 +78,7 @@ class RolloutLearner(NetworkLearner):
 
     min_rows = 0
     num_kept = 1  # rollouts that an update learns from
+    num_ahead = 1  # last steps that wait for the next update: their value bootstraps the steps before them
     teacher = "rewards"
 
     def __init__(self, actor: NetworkAgent, seed: int):
@@ -101,8 +102,8 @@ class RolloutLearner(NetworkLearner):
         raise NotImplementedError
 
     def columns(self, parts: list[np.ndarray]) -> list[np.ndarray]:
-        """Returns the parts of rows, `[T - 1, B, ...]` each, of the parts `[T, B, ...]` that `seen` returned."""
-        return [part[:-1] for part in parts]
+        """Returns the parts of rows, without the steps ahead, of the parts `[T, B, ...]` that `seen` returned."""
+        return [part[: len(part) - self.num_ahead] for part in parts]
 
     def losses(self, rows: Rows) -> dict[str, torch.Tensor]:
         """Returns "loss", of which the gradient is taken, and other scalars by name."""
@@ -129,8 +130,9 @@ class RolloutLearner(NetworkLearner):
     def update(self) -> dict[str, float]:
         """Learns from the rollout; returns the means of its losses and other scalars by name."""
         # The share of the rollout's episodes that ended in the goal; 0 if none ended.
-        num_reached = sum(int(step.terminated.sum()) for step in self._steps[:-1])
-        num_ended = sum(int(step.ended.sum()) for step in self._steps[:-1])
+        taken = self._steps[: len(self._steps) - self.num_ahead]
+        num_reached = sum(int(step.terminated.sum()) for step in taken)
+        num_ended = sum(int(step.ended.sum()) for step in taken)
         config, sums = self._config, {"success": num_reached / max(1, num_ended)}
         newest = self._forget()
         if newest:
@@ -163,13 +165,10 @@ class RolloutLearner(NetworkLearner):
                 yield rows.on(order[begin : begin + num_shared])
 
     def _forget(self) -> dict[int, Rows]:
-        """Returns the rollout's rows by the size of what they share, and forgets its steps.
-
-        The last step in each environment stays, for its value bootstraps the steps before it.
-        """
-        steps = self._steps
+        """Returns the rollout's rows by the size of what they share, and forgets its steps but for those ahead."""
+        steps, num_taken = self._steps, len(self._steps) - self.num_ahead
         parts = self.columns([np.stack(part) for part in zip(*(step.seen.parts for step in steps), strict=True)])
-        taken, self._steps = steps[:-1], steps[-1:]
+        taken, self._steps = steps[:num_taken], steps[num_taken:]
         if not taken:
             return {}
         sizes = np.array([[each.shape[-1] for each in step.seen.shared] for step in taken])

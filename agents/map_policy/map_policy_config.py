@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ..common.config_values import Count, Factor, Length, Rows, Share
-from ..imitation import ImitationConfig
+from ..imitation import DriveSteps, ImitationConfig
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -14,6 +14,7 @@ class MapPolicyConfig(ImitationConfig):
 
     # A network that can't drive yet stays where it begins: its drives show few places of few maps.
     oracle_drives: Share = 1.0
+    drive_steps: DriveSteps = 25  # as many as a rollout has, so that each map has a row of states in it
     num_envs: Count = 64
     rollout_steps: Length = 25  # a map is read once for as many steps; the default milestones end rollouts
     total_steps: Rows = 80_000

@@ -195,7 +195,8 @@ class TrainingLoop:
     def _train_until(self, env_steps: int) -> None:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
         seeds = np.random.SeedSequence((self._options.seed, self._counters.env_steps))
-        steps = self._collector.collect(self._actor, int(seeds.generate_state(1)[0]), self._learner.driven)
+        learner, seed = self._learner, int(seeds.generate_state(1)[0])
+        steps = self._collector.collect(self._actor, seed, learner.driven, learner.drive_steps)
         while self._counters.env_steps < env_steps and self._share_done() < 1.0:
             line_steps = self._counters.logged_steps + STEPS_BETWEEN_LINES
             if line_steps <= self._counters.env_steps < env_steps - STEPS_BETWEEN_LINES // 2:  # a milestone has a line

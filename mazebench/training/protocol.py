@@ -87,6 +87,10 @@ class Learner(Protocol):
         """Agent steps from one update to the next, of all environments together; scores do not depend on speed."""
 
     @property
+    def drive_steps(self) -> int:
+        """Agent steps after which all environments begin new episodes; 0 if they go on until their ends."""
+
+    @property
     def num_rows(self) -> int:
         """The number of rows of experience that are stored now."""
 
