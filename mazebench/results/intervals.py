@@ -22,7 +22,7 @@ _DEFAULT_WEIGHT = 2.0
 _UPPER_TAIL = (1 + CONFIDENCE) / 2
 _NUM_DRAWS = 4000  # of a bootstrap
 _MOST_DRAWN = 1000  # mazes
-_EQUAL = 1e-9  # differences of differences that are none
+_EQUAL = 1e-9  # differences of mazes' means that are none
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +82,7 @@ def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
         sqrt(K / (K - 1)) t(K - 1) / z,
 
     by which intervals of means of K values are wider than the bootstrap's; t and z are quantiles. With one maze,
-    episodes are drawn again. The interval is that of `_adjusted_interval` where all differences are equal, for then no
+    episodes are drawn again. The interval is that of `_adjusted_interval` where all mazes have equal means, for then no
     draw tells how far others might be, and from 1,000 mazes on. docs/intervals.md has a simulation of the coverage.
 
     Args:
@@ -92,11 +92,11 @@ def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
     clusters = _clusters(mazes)
     mean = float(np.mean(differences))
     num_clusters = int(clusters.max()) + 1
-    if np.ptp(differences) < _EQUAL or num_clusters > _MOST_DRAWN:
+    sums, sizes = (np.bincount(clusters, weights=each) for each in (differences, np.ones(len(clusters))))
+    if np.ptp(sums / sizes) < _EQUAL or num_clusters > _MOST_DRAWN:
         return Estimate(mean, *_adjusted_interval(differences, clusters))
 
     # The mean of each draw: the sum over its mazes by the number of their episodes.
-    sums, sizes = (np.bincount(clusters, weights=each) for each in (differences, np.ones(len(clusters))))
     draws = _draws(num_clusters)
     means = draws @ sums / (draws @ sizes)
     low, high = np.quantile(means, (1 - _UPPER_TAIL, _UPPER_TAIL))

@@ -74,7 +74,7 @@ class Actions:
                 f"expected velocities ({', '.join(self._names)}) from -1 to 1 of shape {shape}, "
                 f"found shape {velocities.shape}, values {_in_short(velocities)}"
             )
-        clipped = np.clip(velocities, -1.0, 1.0)
+        clipped = np.clip(velocities.astype(float), -1.0, 1.0)  # of any type, equal velocities give equal controls
         return self._body.velocity_controls(np.insert(clipped, 1, 0.0, axis=-1) if self._kind == "diff" else clipped)
 
 
