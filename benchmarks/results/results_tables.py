@@ -45,10 +45,8 @@ ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
 PAGES = (
     "README.md",
-    *(
-        f"docs/{name}.md"
-        for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm", "real", "datasheet")
-    ),
+    *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
+    *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
     *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
 )
