@@ -144,9 +144,7 @@ _IN_REAL_BUILDINGS = {
     "navigator": "`navigator`, classical",
     "navigator-camera": "`navigator` by camera",
     "neural-planner": "`neural-planner`, learned",
-    "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map",
     "dagger:Student": "90-second imitation of the oracle, reads distances on the map",
-    "map-policy-camera": "`map-policy`, learned, by camera",
     "random": "`random`",
 }
 _REAL_SETTINGS = {
