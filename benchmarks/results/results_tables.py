@@ -144,7 +144,9 @@ _IN_REAL_BUILDINGS = {
     "navigator": "`navigator`, classical",
     "navigator-camera": "`navigator` by camera",
     "neural-planner": "`neural-planner`, learned",
-    "dagger:Student": "90-second imitation of the oracle, reads distances on the map",
+    "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map, one run",
+    "dagger:Student": "90-second imitation of the oracle, reads distances on the map, one run",
+    "map-policy-camera": "`map-policy`, learned, by camera",
     "random": "`random`",
 }
 _REAL_SETTINGS = {
