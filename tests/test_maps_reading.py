@@ -154,24 +154,25 @@ class TestSlantedBuildings:
         assert locate_maze(grid, ReadOptions(), "map").origin[2] == 0
 
 
+def _two_rooms_with_a_door(num_rows: int) -> np.ndarray:
+    """The blocked pixels of two rooms, each 3 cells wide, and of a wall of a cell with a door between them."""
+    blocked = np.ones((num_rows * _PIXELS, 9 * _PIXELS), dtype=bool)
+    for left in (1, 5):
+        blocked[_PIXELS:-_PIXELS, left * _PIXELS : (left + 3) * _PIXELS] = False
+    blocked[20:29, 4 * _PIXELS : 5 * _PIXELS] = False
+    return blocked
+
+
 class TestNarrowWays:
     def test_the_fewest_cells_are_opened(self):
         # Two rooms of 3 x 5 cells, and between them a wall of a cell with a door half in one cell, half in the next.
-        blocked = np.ones((7 * _PIXELS, 9 * _PIXELS), dtype=bool)
-        blocked[_PIXELS : 6 * _PIXELS, _PIXELS : 4 * _PIXELS] = blocked[
-            _PIXELS : 6 * _PIXELS, 5 * _PIXELS : -_PIXELS
-        ] = False
-        blocked[20:29, 4 * _PIXELS : 5 * _PIXELS] = False
+        blocked = _two_rooms_with_a_door(7)
         walls, opened = _opened(blocked)
         assert np.argwhere(walls & ~opened).tolist() in ([[2, 4]], [[3, 4]])
 
     def test_a_way_that_a_thin_wall_divides_is_left_closed(self):
         # A passage of 0.4 m along the side of a room, in the same cells as the wall between them, to no place.
-        blocked = np.ones((9 * _PIXELS, 9 * _PIXELS), dtype=bool)
-        blocked[_PIXELS : 8 * _PIXELS, _PIXELS : 4 * _PIXELS] = blocked[
-            _PIXELS : 8 * _PIXELS, 5 * _PIXELS : -_PIXELS
-        ] = False
-        blocked[20:29, 4 * _PIXELS : 5 * _PIXELS] = False
+        blocked = _two_rooms_with_a_door(9)
         blocked[20:29, 36] = True
         walls, opened = _opened(blocked)
         assert (walls == opened).all()

@@ -21,6 +21,7 @@ from mazebench.maps.readers.occupancy_grid import (
     UNKNOWN,
     OccupancyGrid,
     Pose,
+    known_box,
     states_in_cells,
 )
 
@@ -146,10 +147,8 @@ def _shape(grid: OccupancyGrid, side: float) -> tuple[int, int]:
 
 def _squares(grid: OccupancyGrid, side: float) -> _Squares:
     """Returns the averages of the known part of a map in squares of a whole number of pixels, about `side` wide."""
-    is_known = grid.states != UNKNOWN
-    rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
-    top, left = (int(rows[0]), int(columns[0])) if len(rows) else (0, 0)
-    states = grid.states[top : rows[-1] + 1, left : columns[-1] + 1] if len(rows) else grid.states
+    rows, columns = known_box(grid.states)
+    states = grid.states[rows, columns]
     pixels = max(1, round(side / grid.resolution))
     states = np.pad(states, [(0, -length % pixels) for length in states.shape], constant_values=UNKNOWN)
     height, width = (length // pixels for length in states.shape)
@@ -159,7 +158,7 @@ def _squares(grid: OccupancyGrid, side: float) -> _Squares:
     )
     wall = np.minimum(1, _THIN * wall)
     values = free * (1 - wall) - _WALL * cv2.GaussianBlur(wall, (0, 0), _BLUR)
-    return _Squares(values, pixels * grid.resolution, np.array([left, top]) * grid.resolution)
+    return _Squares(values, pixels * grid.resolution, np.array([columns.start, rows.start]) * grid.resolution)
 
 
 def _best_shifts(below: _Squares, above: _Squares) -> tuple[np.ndarray, np.ndarray]:

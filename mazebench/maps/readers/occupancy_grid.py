@@ -216,13 +216,11 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     maze = Maze(walls, name, cell_size)
 
     # Where the maze lies, in pixels from the edges of the map.
-    top, left = _known_corner(grid)
+    top, left = (span.start for span in known_box(grid.states))
     from_left, from_top = left + cells.right + column * pixels, top + cells.down + row * pixels
     from_below = len(grid.states) - from_top - size * pixels
-    x, y, yaw = grid.origin
-    right, up = from_left * grid.resolution, from_below * grid.resolution
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    origin = x + cosine * right - sine * up, y + sine * right + cosine * up, yaw
+    corner = _transformed(grid.origin, from_left * grid.resolution, from_below * grid.resolution)
+    origin = *corner, grid.origin[2]
 
     # What a user should know.
     if pixels > 1:
@@ -253,22 +251,22 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     return LocatedMaze(maze, origin)
 
 
-def _known_corner(grid: OccupancyGrid) -> tuple[int, int]:
-    """Returns the first row and the first column of which something is known; 0 if nothing is."""
-    known = grid.states != UNKNOWN
-    return int(known.any(axis=1).argmax()), int(known.any(axis=0).argmax())
+def known_box(states: np.ndarray) -> tuple[slice, slice]:
+    """Returns the rows and the columns of `states` from the first to the last of which something is known, or all."""
+    known = states != UNKNOWN
+    spans = [np.flatnonzero(known.any(axis=axis)) for axis in (1, 0)]
+    if not len(spans[0]):
+        return slice(0, len(states)), slice(0, states.shape[1])
+    rows, columns = (slice(int(span[0]), int(span[-1]) + 1) for span in spans)
+    return rows, columns
 
 
 def _known_part(grid: OccupancyGrid) -> OccupancyGrid:
     """Returns a map without the rows and columns around it of which nothing is known; all of it if nothing is."""
-    known = grid.states != UNKNOWN
-    if not known.any():
-        return grid
-    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
-    states = grid.states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    right, up = columns[0] * grid.resolution, (len(grid.states) - 1 - rows[-1]) * grid.resolution
+    rows, columns = known_box(grid.states)
+    right, up = columns.start * grid.resolution, (len(grid.states) - rows.stop) * grid.resolution
     x, y = _transformed(grid.origin, right, up)
-    return dataclasses.replace(grid, states=states, origin=(float(x), float(y), grid.origin[2]))
+    return dataclasses.replace(grid, states=grid.states[rows, columns], origin=(float(x), float(y), grid.origin[2]))
 
 
 def _turned(grid: OccupancyGrid, turn: float) -> OccupancyGrid:
@@ -343,9 +341,8 @@ def _with_ways(
     if np.sum(positions & ~seen.at(_grown(area))) * seen.picture.resolution**2 < WORTH_REACHING:
         return walls
     nodes = nodes_of(positions, seen.cell_of, area.shape, seen.picture.resolution)
-    least = (
-        WORTH_REACHING if seen.is_turned else _MANY_LOST
-    )  # cells along the picture stay as they are if little is lost
+    # Cells along the picture stay as they are if little is lost.
+    least = WORTH_REACHING if seen.is_turned else _MANY_LOST
     return open_ways(walls, area, _grown(_ground(areas, number)), nodes, least)
 
 
