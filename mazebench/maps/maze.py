@@ -148,29 +148,21 @@ class Maze:
 
     def distances(self, source: Cell) -> np.ndarray:
         """Returns the length in cells of a shortest 4-connected path from `source`: `[N, N]` int, -1 at walls."""
-        self.require_free(source)
-        result = np.full((self.size, self.size), -1, dtype=np.int32)
-        if self.keeps_distances:
-            result[~self.walls] = self._distance_row(source)
-        else:
-            cells, ends = self._search(source)
-            result.ravel()[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-        return result
+        return self._distances_from(self.require_free(source)).copy()
 
     def distance(self, start: Cell, goal: Cell) -> int:
         """Returns the length in cells of a shortest 4-connected path between two free cells."""
-        self.require_free(start)
-        self.require_free(goal)
-        if not self.keeps_distances:
-            _, ends = self._search(start, goal[0] * self.size + goal[1])
-            return len(ends) - 1
-        return int(self._distance_row(start)[self._index[tuple(goal)]])
+        start, goal = self.require_free(start), self.require_free(goal)
+        if self.keeps_distances:
+            return int(self._distances_from(start)[goal])
+        _, ends = self._search(start, goal[0] * self.size + goal[1])
+        return len(ends) - 1
 
     def cells_at(self, source: Cell, distance: int) -> np.ndarray:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
-        self.require_free(source)
+        source = self.require_free(source)
         if self.keeps_distances:
-            return self.free_cells[self._distance_row(source) == distance]
+            return np.argwhere(self._distances_from(source) == distance)
         cells, ends = self._search(source, farthest=distance)
         at_distance = cells[ends[distance - 1] if distance else 0 :] if len(ends) > distance else cells[:0]
         return np.stack(np.divmod(np.sort(at_distance).astype(np.int64), self.size), axis=-1)
@@ -179,7 +171,7 @@ class Maze:
     def diameter(self) -> int:
         """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
         if self.keeps_distances:
-            return int(scipy.sparse.csgraph.dijkstra(self.graph, unweighted=True).max())
+            return max(len(self._search(cell)[1]) for cell in self.free_cells) - 1
         farthest = int(self.distances(tuple(self.free_cells[0])).argmax())
         return int(self.distances(divmod(farthest, self.size)).max())
 
@@ -189,36 +181,18 @@ class Maze:
         return cover(self.walls)
 
     @functools.cached_property
-    def _index(self) -> np.ndarray:  # [N, N] int: the index of a free cell among `free_cells`, -1 at walls
-        index = np.full(self.walls.shape, -1, dtype=np.int64)
-        index[~self.walls] = np.arange(len(self.free_cells))
-        return index
-
-    @functools.cached_property
-    def graph(self) -> scipy.sparse.csr_array:
-        """The 4-connected graph of the `free_cells`: `[F, F]`, with an edge both ways between neighbours."""
-        # The pairs of neighbours: side by side, then one above the other.
-        first = np.concatenate([self._index[:, :-1].ravel(), self._index[:-1].ravel()])
-        second = np.concatenate([self._index[:, 1:].ravel(), self._index[1:].ravel()])
-        linked = (first >= 0) & (second >= 0)
-        first, second = first[linked], second[linked]
-
-        # Both ways.
-        ones = np.ones(2 * len(first))  # of the type that SciPy's searches take without a copy
-        row, column = np.concatenate([first, second]), np.concatenate([second, first])
-        return scipy.sparse.csr_array((ones, (row, column)), shape=(len(self.free_cells),) * 2)
-
-    @functools.cached_property
-    def _rows(self) -> dict[int, np.ndarray]:  # what `_distance_row` returned, by source
+    def _kept_distances(self) -> dict[Cell, np.ndarray]:
         return {}
 
-    def _distance_row(self, source: Cell) -> np.ndarray:  # [F] int: from a free cell to each free cell
-        index = int(self._index[tuple(source)])
-        row = self._rows.get(index)
-        if row is None:
-            row = scipy.sparse.csgraph.dijkstra(self.graph, unweighted=True, indices=index).astype(np.int32)
-            self._rows[index] = row
-        return row
+    def _distances_from(self, source: Cell) -> np.ndarray:  # [N, N] int32, -1 at walls, which nobody may write to
+        result = self._kept_distances.get(source)
+        if result is None:
+            cells, ends = self._search(source)
+            result = np.full((self.size, self.size), -1, dtype=np.int32)
+            result.ravel()[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
+            if self.keeps_distances:
+                self._kept_distances[source] = result
+        return result
 
     def _search(self, source: Cell | np.ndarray, goal: int = -1, farthest: int = MAX_SIZE**2) -> tuple[np.ndarray, ...]:
         from mazebench.maps.search import search  # which needs numba
