@@ -16,7 +16,7 @@ import pathlib
 import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
@@ -58,17 +58,41 @@ def compiled(
     math = {"contract"} if fused else False
     compile_it: Any = functools.partial(numba.njit, forceinline=inline, nogil=nogil, error_model="numpy", fastmath=math)
     kernel = compile_it(function)
-    package, file = sys.modules[function.__module__.partition(".")[0]], pathlib.Path(function.__code__.co_filename)
-    if _CONFIG.DISABLE_JIT or not hasattr(package, "__path__") or not file.exists():
-        return kernel  # Python, or of a script or an archive, of which nothing says what its kernels use
-    if (folder := cache_folder(file.parent / "__pycache__", _digest(package.__name__))) is None:
+    if (folder := _folder_of(function)) is None:
         return kernel
-    given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)
-    with contextlib.suppress(RuntimeError):  # numba found no folder that it can write to
+    with _kept_in(folder), contextlib.suppress(RuntimeError):  # numba found no folder that it can write to
         kernel.enable_caching()
-    _CONFIG.CACHE_DIR = given
     # Where another user has made a folder below this one, numba chose one of its own.
     return kernel if str(kernel.stats.cache_path).startswith(str(folder)) else compile_it(function)
+
+
+def c_callback(signature: str, function: Callable[..., Any]) -> Any:
+    """Returns `function` as a C function of numba's type `signature`, for libraries that call one; see `compiled`.
+
+    Its attribute `ctypes` is the pointer. It lives as long as the object.
+    """
+    if (folder := _folder_of(function)) is None:
+        return numba.cfunc(signature)(function)
+    with _kept_in(folder):
+        return numba.cfunc(signature, cache=True)(function)
+
+
+def _folder_of(function: Callable[..., Any]) -> pathlib.Path | None:
+    """Returns the folder for a function's machine code, None if it is not kept."""
+    package, file = sys.modules[function.__module__.partition(".")[0]], pathlib.Path(function.__code__.co_filename)
+    if _CONFIG.DISABLE_JIT or not hasattr(package, "__path__") or not file.exists():
+        return None  # Python, or of a script or an archive, of which nothing says what its kernels use
+    return cache_folder(file.parent / "__pycache__", _digest(package.__name__))
+
+
+@contextlib.contextmanager
+def _kept_in(folder: pathlib.Path) -> Iterator[None]:
+    """Makes numba keep in a folder the machine code of the functions that it is given meanwhile."""
+    given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)
+    try:
+        yield
+    finally:
+        _CONFIG.CACHE_DIR = given
 
 
 @functools.cache

@@ -20,6 +20,7 @@ from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.task import Task as MazeTask
 from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.models import MazeModels, models_of
+from mazebench.world.profiler import stop_profiler
 from mazebench.world.rendering import opening_context
 from mazebench.world.simulation import FULL_STATE, Simulation
 
@@ -45,6 +46,7 @@ class Physics(Simulation, engine.Physics):
     @classmethod
     def of_mazes(cls, models: MazeModels) -> Physics:
         """Returns a simulation of the first of some mazes, with the body in its first free cell."""
+        stop_profiler()
         physics = cls.from_model(wrapper.MjModel(copy.copy(models[0])))
         physics.models, physics._others = models, {}
         with physics.reset_context():

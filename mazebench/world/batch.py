@@ -12,6 +12,8 @@ import weakref
 import mujoco
 import mujoco.batch
 
+from mazebench.world.profiler import stop_profiler
+
 _batches: weakref.WeakSet[mujoco.batch.Batch] = weakref.WeakSet()
 
 
@@ -20,6 +22,7 @@ def open_batch(model: mujoco.MjModel, num_sims: int, num_threads: int) -> mujoco
 
     A process that is forked meanwhile may run to its end, and open batches of its own, but it must not use this one.
     """
+    stop_profiler()
     batch = mujoco.batch.Batch(model, num_sims, num_threads)
     _batches.add(batch)
     return batch

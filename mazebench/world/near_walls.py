@@ -24,7 +24,8 @@ _MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
 _AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
 _FEW = 4  # bodies in other cells, whose boxes are sooner looked up one by one
 _FIRST_WALL = 1  # index of its geom, after the floor
-_NO_TREE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # contacts are searched without trees of bounding boxes
+# Contacts are searched without trees of bounding boxes, and not sorted into islands, of which one body has one.
+_NOT_NEEDED = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE | mujoco.mjtDisableBit.mjDSBL_ISLAND)
 
 
 class WallGeoms(NamedTuple):
@@ -75,7 +76,7 @@ class NearWalls:
         self._entered: dict[tuple[int, int], list[np.ndarray]] = {}  # by maze and cell: what `_near` returns
 
         self.model = boxes_spec(mazes[0], *self._parked, body=body).compile()
-        self.model.opt.disableflags |= _NO_TREE
+        self.model.opt.disableflags |= _NOT_NEEDED
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Makes pickles hold the mazes only."""

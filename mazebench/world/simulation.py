@@ -13,6 +13,7 @@ import numpy as np
 
 from mazebench.world.angles import wrap_angle
 from mazebench.world.near_walls import NearWalls, WallGeoms
+from mazebench.world.profiler import stop_profiler
 
 FULL_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # all that MuJoCo's next step depends on
 
@@ -67,6 +68,7 @@ class MujocoSimulation(Simulation):
 
         With `walls`, whose model it then is, `surround` chooses the walls.
         """
+        stop_profiler()
         self.model = copy.copy(model)
         self.data = mujoco.MjData(self.model)
         self._walls, self._geoms = walls, WallGeoms.of_model(self.model)
