@@ -21,7 +21,6 @@ from mazebench.world.simulation import Simulation
 _Value = TypeVar("_Value")
 
 _RUNNING = np.ones(1, dtype=bool)
-_INDEX = np.zeros(1, dtype=np.int64)
 _NO_STATE = ("task", "_sensors", "_shows_goal")  # attributes of the rules that no step changes
 _SHARED = ("episodes", "shown", "_ways")  # attributes whose values never change
 
@@ -115,7 +114,7 @@ class TaskRunner:
 
     def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
         """Returns the observation of the present moment; each call draws new noise."""
-        observed = self.rules.observe(self._body.state(simulation.data.sensordata)[None], _INDEX)
+        observed = self.rules.observe(self._body.state(simulation.data.sensordata)[None])
         found = {"state": observed.pop("state")[0], "context": self.rules.context[0].copy()}
         return found | {name: values[0] for name, values in observed.items()}
 

@@ -112,6 +112,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             name: np.zeros((num_envs, *array.shape), array.dtype) for name, array in observation_specs(task).items()
         }
         self._observed["context"] = self.rules.context
+        self._masks = [f"_{name}" for name in self.rules.infos()]
 
         # The simulation, with views of its arrays.
         self._body, self._actions = task.body, Actions(task.actions, task.body)
@@ -212,7 +213,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         # With NEXT_STEP, begin the episodes that follow those that ended in the step before.
         if self._ended.any():
             self._begin_episodes(np.flatnonzero(self._ended))
-        self._observe(np.arange(self.num_envs))
+        self._observe()
         infos = self._infos()
 
         # With SAME_STEP, begin those that follow the ones that ended in this step.
@@ -287,23 +288,21 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             self._walls.write(self._geoms, moved, maze[moved], cell[moved])
             self._around[:] = maze, cell
 
-    def _observe(self, indices: np.ndarray) -> None:
-        """Takes over what the agents of the environments `indices` observe; each call draws new noise."""
-        states = self._body.states(self._sensordata[indices])
-        for name, values in self.rules.observe(states, indices).items():
-            if len(indices) == self.num_envs:
-                self._observed[name] = values  # pictures are large, so they are not copied
-            else:
-                self._observed[name][indices] = values
+    def _observe(self, indices: np.ndarray | None = None) -> None:
+        """Takes over what the agents of all environments observe, or of `indices`; each call draws new noise."""
+        if indices is None:
+            self._observed |= self.rules.observe(self._body.states(self._sensordata))
+            return
+        for name, values in self.rules.observe(self._body.states(self._sensordata[indices]), indices).items():
+            self._observed[name][indices] = values
 
     def _observations(self) -> dict[str, np.ndarray]:
         return {name: values.copy() for name, values in self._observed.items()}
 
     def _infos(self, mask: np.ndarray | None = None) -> dict[str, Any]:
         """Returns the infos; `mask` (`[B]` bool) says of which environments they are, of all by default."""
-        infos = self.rules.infos()
         mask = np.ones(self.num_envs, dtype=bool) if mask is None else mask
-        return infos | {f"_{key}": mask for key in infos}
+        return self.rules.infos() | dict.fromkeys(self._masks, mask)
 
     def draw_distances(self, distances: Sequence[int]) -> None:
         """Draws episodes with goals at these distances from now on, see `mazebench.Task.at_distances`."""

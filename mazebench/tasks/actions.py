@@ -57,13 +57,14 @@ class Actions:
         if self._is_continuous:
             return self._of_velocities(actions, (num_envs,))
         actions, num_actions = np.asarray(actions), len(self._names)
-        is_integer = np.issubdtype(actions.dtype, np.integer)
-        if actions.shape != (num_envs,) or not is_integer or actions.min() < 0 or actions.max() >= num_actions:
-            raise InputError(
-                f"expected {num_envs} actions from 0 to {num_actions - 1}, found shape {actions.shape}, "
-                f"values {_in_short(actions)}"
-            )
-        return self._controls[actions.astype(np.int64, copy=False)]
+        if actions.shape == (num_envs,) and actions.dtype.kind in "iu":
+            indices = actions.astype(np.int64, copy=False)
+            if indices.view(np.uint64).max() < num_actions:  # as which numbers below 0 are large
+                return self._controls[indices]
+        raise InputError(
+            f"expected {num_envs} actions from 0 to {num_actions - 1}, found shape {actions.shape}, "
+            f"values {_in_short(actions)}"
+        )
 
     def _of_velocities(self, velocities: int | np.ndarray, batch: Sequence[int]) -> np.ndarray:
         """Returns `[*batch, C]` float: the controls of continuous actions, which are clipped to [-1, 1]."""

@@ -23,10 +23,6 @@ from mazebench.world.angles import wrap_angle
 
 _UNKNOWN = -1  # a way that would take long to measure
 _OUT_OF_SIGHT = 1e6  # m, where cameras do not see the goal's disc
-_INFOS = (  # what `Rules.infos` describes, in this order
-    *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
-    *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
-)
 
 
 class Names(np.ndarray):
@@ -277,21 +273,26 @@ class Rules:
         """Returns the reward of environment i for the last step."""
         return reward(self.reached.item(i)) + self.progress.item(i)
 
-    def observe(self, states: np.ndarray, indices: np.ndarray) -> dict[str, np.ndarray]:
+    def observe(self, states: np.ndarray, indices: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by name: all observations but the context, of the environments `indices` (`[K]` int).
 
-        `states` (`[K, 12]` float64) are the true ones, to which errors are added in place. Each call draws new noise.
+        None stands for all B. `states` (`[K, 12]` float64) are the true ones, to which errors are added in place. Each
+        call draws new noise.
         """
-        if any(self._state_errors):
-            for state, i in zip(states, indices.tolist(), strict=True):
-                for add_error in self._state_errors[i]:
-                    add_error(state)
+        errors, noise, worlds = self._state_errors, self._noise, (self.maze, self.pose, self.marker)
+        if indices is not None:
+            chosen = indices.tolist()
+            errors, noise = [errors[i] for i in chosen], [noise[i] for i in chosen]
+            worlds = self.maze[indices], self.pose[indices], self.marker[indices]
+        for state, of_state in zip(states, errors, strict=True):
+            for add_error in of_state:
+                add_error(state)
         observed = {"state": states.astype(np.float32)}
         if self.task.options.sensors:
-            noise = [self._noise[i] for i in indices.tolist()]
-            marker = self.marker[indices] if self._shows_goal else np.full((len(indices), 3), _OUT_OF_SIGHT)
-            worlds = self.maze[indices], self.pose[indices], marker
-            observed |= self._sensors.read(*worlds, noise, self._num_threads)
+            maze, pose, marker = worlds
+            if not self._shows_goal:
+                marker = np.full(marker.shape, _OUT_OF_SIGHT)
+            observed |= self._sensors.read(maze, pose, marker, noise, self._num_threads)
         return observed
 
     def infos(self) -> dict[str, np.ndarray]:
@@ -312,13 +313,25 @@ class Rules:
         - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
         - track: "" without one. level: of the track, 0 without one. Kinds and tracks are `Names`.
         """
-        values = vars(self) | {
-            "success": self.reached,
-            "position": self.pose[:, :2],
+        return {
+            "is_first": self.is_first.copy(),
+            "success": self.reached.copy(),
+            "goal_reached": self.goal_reached.copy(),
+            "steps": self.steps.copy(),
+            "path_length": self.path_length.copy(),
+            "position": self.pose[:, :2].copy(),
             "yaw": wrap_angle(self.pose[:, 2]),
+            "maze": self.maze.copy(),
+            "landmark": self.landmark.copy(),
+            "time_limit": self.time_limit.copy(),
             "steps_left": self._deadline - self.steps,
+            "way_left": self.way_left.copy(),
+            "distance": self.distance.copy(),
+            "blocked": self.blocked.copy(),
+            "kind": self.kind.copy(),
+            "track": self.track.copy(),
+            "level": self.level.copy(),
         }
-        return {name: values[name].copy() for name in _INFOS}
 
     def info(self, i: int) -> dict[str, Any]:
         """Returns the `infos` of environment i as plain values, in a fraction of the time."""
