@@ -55,10 +55,12 @@ def environments(num_envs: Sequence[int] = NUM_ENVS) -> list[Side]:
     return [
         Side("bare MuJoCo loop", _bare_loop(task)),
         Side("Gymnasium", _gymnasium(task)),
-        Side("Gymnasium, rebuilt", _gymnasium(Task.of("rebuilt"))),
+        Side("Gymnasium, lidar", _gymnasium(Task.of(sensors=("lidar",), lidar_noise="turtlebot3"))),
+        Side("Gymnasium, rebuilt", _gymnasium(Task.of("rebuilt", level=2))),
         *([Side("dm_control", _dm_control(task))] if find_spec("dm_control") else []),  # not for each Python
         *(_vector(f"vector, {count:,}", task, count) for count in num_envs),
-        _vector(f"vector, {middle:,}, 1 thread", task, middle, num_threads=1),
+        *(_vector(f"vector, {count:,}, 1 thread", task, count, num_threads=1) for count in num_envs if count <= middle),
+        _vector(f"vector, {middle:,}, lidar, 1 thread", Task.of(sensors=("lidar",)), middle, num_threads=1),
         _vector(f"vector, {middle:,}, lidar", Task.of(sensors=("lidar",)), middle),
     ]
 
