@@ -32,12 +32,8 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.
       cell_size: m.
     """
     # Outside of the box around what may be free, there is no way.
-    is_open = walls < 1
-    is_open[start] = True
-    rows, columns = (np.flatnonzero(is_open.any(axis=1 - axis)) for axis in (0, 1))
-    top, left = int(rows[0]), int(columns[0])
-    walls, goal = (each[top : rows[-1] + 1, left : columns[-1] + 1] for each in (walls, goal))
-    start = (start[0] - top, start[1] - left)
+    top, bottom, left, right = _box(walls, *start)
+    walls, goal = walls[top:bottom, left:right], goal[top:bottom, left:right]
 
     # Entering a cell costs more the likelier it is a wall.
     free = np.maximum(1 - walls, 1e-9)
@@ -48,19 +44,39 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.
     possible = goal > _UNLIKELY * goal.max()
     end[possible] = _GOAL_DETOUR * (goal.max() / goal[possible] - 1)
 
-    following = cheapest_ways(entering, end)
-    width = walls.shape[1]
-    index = start[0] * width + start[1]
-    path = [index]
-    while following[index] != index:
-        index = int(following[index])
-        path.append(index)
-    return [(top + index // width, left + index % width) for index in path]
+    rows, columns = _way_from(entering, end, start[0] - top, start[1] - left)
+    return list(zip((rows + top).tolist(), (columns + left).tolist(), strict=True))
 
 
 @compiled
-def cheapest_ways(entering: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _box(walls: np.ndarray, row: int, column: int) -> tuple[int, int, int, int]:
+    """Returns the first row and the one after the last, and likewise columns, of what may be free and of a cell."""
+    top, bottom, left, right = row, row + 1, column, column + 1
+    for r in range(walls.shape[0]):
+        for c in range(walls.shape[1]):
+            if walls[r, c] < 1:
+                top, bottom, left, right = min(top, r), max(bottom, r + 1), min(left, c), max(right, c + 1)
+    return top, bottom, left, right
+
+
+@compiled
+def _way_from(entering: np.ndarray, end: np.ndarray, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the rows and the columns of the cells on the cheapest way from a cell, which is the first one."""
+    width = end.shape[1]
+    cell = row * width + column
+    following = cheapest_ways(entering, end, cell)
+    cells = [cell]
+    while following[cell] != cell:
+        cell = following[cell]
+        cells.append(cell)
+    return np.array(cells) // width, np.array(cells) % width
+
+
+@compiled
+def cheapest_ways(entering: np.ndarray, end: np.ndarray, first: int = -1) -> np.ndarray:
     """Returns `[N * W]` int32: the index of the next cell on the cheapest way from each, which is its own at the end.
+
+    If `first` is the index of a cell, only the ways from it and from the cells on its way are found.
 
     A step costs what entering the next cell costs. Of equal ways, the one is taken whose next cell is nearer to its
     end, and of these the one whose next cell has the lower index.
@@ -74,13 +90,19 @@ def cheapest_ways(entering: np.ndarray, end: np.ndarray) -> np.ndarray:
     following = np.arange(end.size).astype(np.int32)
 
     # The search begins at the ends. What is popped is settled, so that cells come from near to far.
-    queue = [(least[cell // width, cell % width], cell) for cell in range(end.size)]
+    queue = [
+        (end[cell // width, cell % width], cell)
+        for cell in range(end.size)
+        if end[cell // width, cell % width] < np.inf
+    ]
     heapq.heapify(queue)
     while queue:
         near, cell = heapq.heappop(queue)
         row, column = cell // width, cell % width
         if near > least[row, column]:
             continue  # a cheaper way was found after this one
+        if cell == first:
+            break
         for down, right in ((-1, 0), (0, -1), (1, 0), (0, 1)):
             r, c = row + down, column + right
             if 0 <= r < height and 0 <= c < width:
