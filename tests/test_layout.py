@@ -17,7 +17,8 @@ is_same = dict(os.environ) == before
 names = ("mujoco", "dm_control", "torch", "cv2", "scipy", "numba", "matplotlib")
 heavy = [name for name in names if name in sys.modules]
 import mazebench.cli  # `render` and `bench` choose a backend before MuJoCo reads it
-heavy += [name for name in ("mujoco", "dm_control", "torch") if name in sys.modules]
+names = ("mujoco", "dm_control", "torch", "numba", "scipy.ndimage", "scipy.sparse")
+heavy += [name for name in names if name in sys.modules]
 print(json.dumps([is_same, heavy]))
 """
     assert json.loads(run_python("-c", program).stdout) == [True, []]

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import ndimage
 
 from mazebench.maps.maze import Maze
 
@@ -166,7 +166,7 @@ def patterns() -> np.ndarray:
 
     def rough() -> np.ndarray:  # smooth noise of several wavelengths, from 0 to 1
         waves = [rng.random((cells, cells)) / cells for cells in (2, 4, 8, 16, 32)]
-        total = sum(ndimage.zoom(w, TEXELS // len(w), order=1, mode="grid-wrap", grid_mode=True) for w in waves)
+        total = sum(scipy.ndimage.zoom(w, TEXELS // len(w), order=1, mode="grid-wrap", grid_mode=True) for w in waves)
         return (total - np.min(total)) / np.ptp(total)
 
     shifted = (x + 16 * (y // 8 % 2)) % 32  # every second row of bricks

@@ -14,7 +14,6 @@ import functools
 import cv2
 import numpy as np
 import scipy
-from scipy.sparse.csgraph import connected_components, dijkstra
 
 WORTH_REACHING = 1.0  # m2, of the positions in a region to which a way is opened
 _ON_FREE_CELLS = 1e-6  # the cost of a step to a free cell, where one to a wall costs 1
@@ -136,7 +135,7 @@ def open_ways(walls: np.ndarray, area: np.ndarray, shut: np.ndarray, nodes: Node
             (cost[reached.links.indices], reached.links.indices, reached.links.indptr), reached.links.shape
         )
         begin = np.flatnonzero(area.ravel()[reached.cells])
-        costs, before, _ = dijkstra(graph, indices=begin, min_only=True, return_predecessors=True)
+        costs, before, _ = scipy.sparse.csgraph.dijkstra(graph, indices=begin, min_only=True, return_predecessors=True)
         number = free.ravel()[reached.cells] * region
         sizes = np.bincount(number, reached.areas)[1:]
         if sizes.any():
@@ -170,7 +169,7 @@ def open_ways(walls: np.ndarray, area: np.ndarray, shut: np.ndarray, nodes: Node
 def _reached(nodes: Nodes, area: np.ndarray, shut: np.ndarray) -> Nodes | None:
     """Returns the nodes that the body reaches from an area, not through what is shut; None if it can't be in it."""
     open_nodes = np.flatnonzero(~shut.ravel()[nodes.cells])
-    _, component = connected_components(nodes.links[open_nodes][:, open_nodes], directed=False)
+    _, component = scipy.sparse.csgraph.connected_components(nodes.links[open_nodes][:, open_nodes], directed=False)
     common = np.bincount(component, (area.ravel()[nodes.cells] * nodes.areas)[open_nodes])
     if not common.any():
         return None
@@ -185,7 +184,7 @@ def _largest_far(nodes: Nodes, area: np.ndarray, is_asked: np.ndarray) -> np.nda
     """
     beside = cv2.dilate(area.astype(np.uint8), np.ones((3, 3))) > 0
     far = np.flatnonzero(is_asked & ~beside.ravel()[nodes.cells])
-    _, component = connected_components(nodes.links[far][:, far], directed=False)
+    _, component = scipy.sparse.csgraph.connected_components(nodes.links[far][:, far], directed=False)
     sizes = np.bincount(component, nodes.areas[far], minlength=1)
     if sizes.max() < WORTH_REACHING:
         return None

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.maps.passages import door_width
 from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
@@ -44,6 +43,8 @@ class HandDrawnMap(Perturbation):
     pixels_per_cell = PIXELS
 
     def shown(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+        from mazebench.maps.passages import door_width  # which needs numba
+
         size, cell_size = len(shown.walls), shown.cell_size
         # A drawn or frozen maze has doors of one cell, of 1 m on the tracks.
         door = cell_size if shown.kind else door_width(shown.walls, cell_size)
