@@ -68,19 +68,38 @@ def moved(
     bearing = yaw + BEARINGS[action] if drives else 0.0
     along_x, along_y = math.cos(bearing), math.sin(bearing)
     for _ in range(STEPS_PER_ACTION):
-        force, gain = 0.0, 0.0
-        if drives:
-            force, gain = motion.gain * (motion.drive_speed - vx * along_x - vy * along_y), motion.gain
-        if force > motion.max_force:
-            force, gain = motion.max_force, 0.0
-        force_x, force_y = force * along_x - motion.damping * vx, force * along_y - motion.damping * vy
-        push_x, push_y = _push(motion, walls, cell_size, x, y, vx, vy, force_x, force_y)
-        # MuJoCo's integrator implicitfast takes the dampings of the next velocity, each axis by itself.
-        damping_x, damping_y = motion.damping + gain * along_x**2, motion.damping + gain * along_y**2
-        vx += PHYSICS_TIMESTEP * (force_x + push_x) / (motion.mass + PHYSICS_TIMESTEP * damping_x)
-        vy += PHYSICS_TIMESTEP * (force_y + push_y) / (motion.mass + PHYSICS_TIMESTEP * damping_y)
-        x, y = x + PHYSICS_TIMESTEP * vx, y + PHYSICS_TIMESTEP * vy
+        x, y, vx, vy = _after_physics_step(motion, walls, cell_size, x, y, vx, vy, drives, along_x, along_y)
     return x, y, vx, vy
+
+
+@compiled
+def moved_by_each(
+    motion: Motion,
+    walls: np.ndarray,
+    cell_size: float,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    yaw: float,
+    after: np.ndarray,
+) -> None:
+    """Writes what `moved` returns for each of the drives, and then for coasting, into `after` (`[5, 4]` float).
+
+    The actions take turns in each physics step. No action waits for another one, so a processor that computes several
+    of them at once takes six tenths of the time.
+    """
+    along = np.zeros((len(after), 2))
+    for action in range(len(after)):
+        after[action] = x, y, vx, vy
+        if action < len(BEARINGS):
+            along[action] = math.cos(yaw + BEARINGS[action]), math.sin(yaw + BEARINGS[action])
+    for _ in range(STEPS_PER_ACTION):
+        for action in range(len(after)):
+            x, y, vx, vy = after[action]
+            after[action] = _after_physics_step(
+                motion, walls, cell_size, x, y, vx, vy, action < len(BEARINGS), along[action, 0], along[action, 1]
+            )
 
 
 def moved_in_the_open(
@@ -88,6 +107,34 @@ def moved_in_the_open(
 ) -> tuple[float, float, float, float]:
     """Returns what `moved` does where no wall is near, with a position (m) since the action began."""
     return moved(motion, _NO_WALLS, 1.0, 0.0, 0.0, vx, vy, yaw, action)
+
+
+@inlined
+def _after_physics_step(
+    motion: Motion,
+    walls: np.ndarray,
+    cell_size: float,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    drives: bool,
+    along_x: float,
+    along_y: float,
+) -> tuple[float, float, float, float]:
+    """Returns the position and the velocity after a physics step, with a drive along a direction or without one."""
+    force, gain = 0.0, 0.0
+    if drives:
+        force, gain = motion.gain * (motion.drive_speed - vx * along_x - vy * along_y), motion.gain
+    if force > motion.max_force:
+        force, gain = motion.max_force, 0.0
+    force_x, force_y = force * along_x - motion.damping * vx, force * along_y - motion.damping * vy
+    push_x, push_y = _push(motion, walls, cell_size, x, y, vx, vy, force_x, force_y)
+    # MuJoCo's integrator implicitfast takes the dampings of the next velocity, each axis by itself.
+    damping_x, damping_y = motion.damping + gain * along_x**2, motion.damping + gain * along_y**2
+    vx += PHYSICS_TIMESTEP * (force_x + push_x) / (motion.mass + PHYSICS_TIMESTEP * damping_x)
+    vy += PHYSICS_TIMESTEP * (force_y + push_y) / (motion.mass + PHYSICS_TIMESTEP * damping_y)
+    return x + PHYSICS_TIMESTEP * vx, y + PHYSICS_TIMESTEP * vy, vx, vy
 
 
 @inlined

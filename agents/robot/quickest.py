@@ -17,7 +17,7 @@ from mazebench.constants import NUM_ACTIONS, STEP_TIME
 from mazebench.kernels import compiled
 from mazebench.world.bodies import Body
 
-from .motion import Motion, moved
+from .motion import BEARINGS, Motion, moved, moved_by_each
 from .moving_body import LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Point
 
 _NODES = 5  # a side of a cell
@@ -152,16 +152,25 @@ def _search(course: Course, yaw: float, beams: Any, turns: int) -> int:
     Headings are at most `turns` looks from the first one; beyond `_TURNS`, the body does not strafe.
     """
     children = np.empty(beams.shape[1] * NUM_ACTIONS, beams.dtype)
+    after = np.empty((len(BEARINGS) + 1, 4))  # of the actions of a parent; both looks are the last one
     count = 1
     for step in range(1, len(beams)):
         num_children = 0
         for parent in range(count):
+            state = beams[step - 1, parent]
+            heading = yaw + course.motion.turn_step * state.turns
+            moved_by_each(
+                course.motion, course.walls, course.cell_size, state.x, state.y, state.vx, state.vy, heading, after
+            )
             for action in range(NUM_ACTIONS):
                 if turns > _TURNS and action in (STRAFE_LEFT, STRAFE_RIGHT):
                     continue
                 child = children[num_children]
-                child.parent, child.action = parent, action
-                num_children += _drive(course, yaw, beams[step - 1, parent], child, turns)
+                child.turns = state.turns + (action == LOOK_LEFT) - (action == LOOK_RIGHT)
+                if abs(child.turns) <= turns:
+                    child.parent, child.action = parent, action
+                    _drive(course, state, child, after[min(action, len(BEARINGS))])
+                    num_children += 1
         count = _keep_best(course.motion, children[:num_children], beams[step], turns)
         if beams[step, 0].score < 0:
             return step
@@ -169,13 +178,9 @@ def _search(course: Course, yaw: float, beams: Any, turns: int) -> int:
 
 
 @compiled
-def _drive(course: Course, yaw: float, state: Any, child: Any, turns: int) -> bool:
-    """Makes `child` the state after an action from `state`; returns whether it turns no further than it may."""
-    child.turns = state.turns + (child.action == LOOK_LEFT) - (child.action == LOOK_RIGHT)
-    heading = yaw + course.motion.turn_step * child.turns
-    x, y, vx, vy = moved(
-        course.motion, course.walls, course.cell_size, state.x, state.y, state.vx, state.vy, heading, child.action
-    )
+def _drive(course: Course, state: Any, child: Any, after: np.ndarray) -> None:
+    """Gives the child of a state a position and a velocity, `after` (`[4]` float), and the score that follows."""
+    x, y, vx, vy = after
     child.x, child.y, child.vx, child.vy = x, y, vx, vy
     child.driven = state.driven + math.hypot(x - state.x, y - state.y)
     if int(x / course.cell_size) == course.goal_x and int(y / course.cell_size) == course.goal_y:
@@ -185,7 +190,6 @@ def _drive(course: Course, yaw: float, state: Any, child: Any, turns: int) -> bo
         if left == np.inf:  # a wall would stop the body
             left = _way_left_at(course, x, y)
         child.score = left + _DRIVEN_WEIGHT * child.driven
-    return abs(child.turns) <= turns
 
 
 @compiled
