@@ -69,28 +69,36 @@ class Drive:
         continues = bool(rest) and ahead[: len(rest)] == rest[: len(ahead)]
         if not continues or not self.actions or math.dist(self.points[0], (x, y)) > _MOST_OFF:
             # The part of the grid around the path, with walls around it.
-            cells, size = np.array(ahead), len(blocked)
-            top, left = cells.min(axis=0) - 2
-            side = int(np.ptp(cells, axis=0).max()) + 5
+            rows, columns = zip(*ahead, strict=True)
+            top, left, size = min(rows) - 2, min(columns) - 2, len(blocked)
+            side = max(max(rows) - top, max(columns) - left) + 3
             walls = np.ones((side, side), dtype=bool)
-            rows, columns = (np.arange(max(first + 1, 0), min(first + side - 1, size)) for first in (top, left))
-            walls[np.ix_(rows - top, columns - left)] = blocked[np.ix_(rows, columns)]
+            inner = tuple(slice(max(first + 1, 0), min(first + side - 1, size)) for first in (top, left))
+            walls[_shifted(inner[0], -top), _shifted(inner[1], -left)] = blocked[inner]
 
             # In metres from its lower left corner. The body is in the first cell, whatever is observed.
-            corner = np.array([left, size - top - side])
-            row, column = ahead[0]
-            first = np.array([column, size - 1 - row])
-            inside = np.clip((body.x, body.y), first + _INSIDE, first + 1 - _INSIDE)
-            x, y = ((inside - corner) * cell_size).tolist()
+            corner_x, corner_y = left, size - top - side
+            (row, column), (last_row, last_column) = ahead[0], ahead[-1]
+            x = (_within(body.x, column) - corner_x) * cell_size
+            y = (_within(body.y, size - 1 - row) - corner_y) * cell_size
             fastest = _FASTEST * body.model.top_speed
-            velocity = np.clip(np.array(body.velocity()) * cell_size, -fastest, fastest).tolist()
-            course = make_course(body.model, walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
+            vx, vy = (min(max(speed * cell_size, -fastest), fastest) for speed in body.velocity())
+            course = make_course(body.model, walls, cell_size, (last_row - top, last_column - left))
             steps = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING
-            actions, points = quickest_drive(course, (x, y), velocity, body.yaw, steps, _WIDTH, strafes)
+            actions, points = quickest_drive(course, (x, y), (vx, vy), body.yaw, steps, _WIDTH, strafes)
             self.actions, self.path = actions[:_STEPS_USED], ahead
-            shift = corner * cell_size
-            self.points = [(body.x * cell_size, body.y * cell_size), *(tuple(shift + each) for each in points)]
+            shift_x, shift_y = corner_x * cell_size, corner_y * cell_size
+            self.points = [(body.x * cell_size, body.y * cell_size), *((shift_x + x, shift_y + y) for x, y in points)]
 
         before, after = self.points.pop(0), self.points[0]
         point = body.x + (after[0] - before[0]) / cell_size, body.y + (after[1] - before[1]) / cell_size
         return self.actions.pop(0), point
+
+
+def _shifted(cells: slice, by: int) -> slice:
+    return slice(cells.start + by, cells.stop + by)
+
+
+def _within(coordinate: float, cell: int) -> float:
+    """Returns the coordinate nearest to one that is well inside of a cell (both in cells)."""
+    return min(max(coordinate, cell + _INSIDE), cell + 1 - _INSIDE)
