@@ -37,11 +37,18 @@ def linear_of(layer: nn.Module) -> Linear:
     return Linear(weight.T.copy(), bias.copy())
 
 
+@inlined
+def copy_to(values: np.ndarray, out: np.ndarray) -> None:
+    """Copies `values` `[n]` into `out` `[n]`; numba takes half a second to compile an assignment of arrays."""
+    for j in range(len(out)):
+        out[j] = values[j]
+
+
 @kernel
 def linear(x: np.ndarray, layer: Linear, out: np.ndarray) -> None:
     """Writes the outputs `[R, outputs]` of a layer for `x` `[R, inputs]`."""
     for r in range(len(x)):
-        out[r] = layer.bias
+        copy_to(layer.bias, out[r])
     add_product(x, layer.weight, out)
 
 

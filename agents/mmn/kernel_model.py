@@ -21,7 +21,19 @@ from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, 
 from ..muzero.search import KernelModel, Root, run_simulations
 from ..muzero.tree import ROOT, Evaluation, Settings, empty_evaluation
 from .hypermodel import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, Code, MMNNetwork
-from .kernel_layers import ONE, ZERO, Linear, add_product, inlined, kernel, linear, linear_of, normalize, rectify
+from .kernel_layers import (
+    ONE,
+    ZERO,
+    Linear,
+    add_product,
+    copy_to,
+    inlined,
+    kernel,
+    linear,
+    linear_of,
+    normalize,
+    rectify,
+)
 from .map_reader import REACH
 
 _TURN = np.float32(2 * math.pi)
@@ -126,7 +138,8 @@ def search(
 ) -> None:
     """Runs all simulations from neighbouring roots, of which `first` is the index of the first one."""
     states = np.empty((*tree.shape, roots.shape[1]), np.float32)
-    states[:, ROOT] = roots
+    for b in range(len(roots)):
+        copy_to(roots[b], states[b, ROOT])
     run_simulations(step, model, first, tree, gumbel, visits, settings, states)
 
 
@@ -166,7 +179,7 @@ def step(
             hidden[0, j] = total
         normalize(hidden[0])
         rectify(hidden[0])
-        change[0] = generated.second_bias[c, 0]
+        copy_to(generated.second_bias[c, 0], change[0])
         add_product(hidden, generated.second[c], change)
 
         # The body after the step, as `hypermodel._moved_by`.
@@ -226,7 +239,7 @@ def arrive(model: Model, first: int, states: np.ndarray, index: int, evaluation:
             distance = rows_away * rows_away + columns_away * columns_away
             x[b, k + 2 + i] = math.exp(-distance / _WIDTHS[i])
         k += NUM_TO_GOAL
-        x[b, k : k + num_codes] = model.task[c]
+        copy_to(model.task[c], x[b, k : k + num_codes])
         k += num_codes
         x[b, k:] = ZERO
         add_read(first_row, first_column, near, size, model.features[c], x[b, k:])
@@ -244,7 +257,7 @@ def arrive(model: Model, first: int, states: np.ndarray, index: int, evaluation:
     # Policies, values, rewards and discounts.
     num_bins = weights.num_bins
     for b in range(num_roots):
-        evaluation.prior_logits[b] = outputs[b, :NUM_ACTIONS]
+        copy_to(outputs[b], evaluation.prior_logits[b])
 
         # The mean of a categorical value.
         logits = outputs[b, NUM_ACTIONS : NUM_ACTIONS + num_bins]
@@ -310,7 +323,7 @@ def write_inputs(
     """Writes `MMNNetwork._inputs`: the latent state, the places by `layers.place_code`."""
     num_latent, num_periods, middle = len(latent), len(_PERIODS), (np.float32(size) - ONE) / _TWO
     unit = _TWO / np.float32(size)
-    out[: num_latent - 2] = latent[2:]
+    copy_to(latent[2:], out[: num_latent - 2])
     k = num_latent - 2
     for axis in range(2):
         place = row if axis == 0 else column

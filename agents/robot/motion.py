@@ -91,15 +91,16 @@ def moved_by_each(
     """
     along = np.zeros((len(after), 2))
     for action in range(len(after)):
-        after[action] = x, y, vx, vy
+        after[action, 0], after[action, 1], after[action, 2], after[action, 3] = x, y, vx, vy
         if action < len(BEARINGS):
-            along[action] = math.cos(yaw + BEARINGS[action]), math.sin(yaw + BEARINGS[action])
+            along[action, 0], along[action, 1] = math.cos(yaw + BEARINGS[action]), math.sin(yaw + BEARINGS[action])
     for _ in range(STEPS_PER_ACTION):
         for action in range(len(after)):
             x, y, vx, vy = after[action]
-            after[action] = _after_physics_step(
+            x, y, vx, vy = _after_physics_step(
                 motion, walls, cell_size, x, y, vx, vy, action < len(BEARINGS), along[action, 0], along[action, 1]
             )
+            after[action, 0], after[action, 1], after[action, 2], after[action, 3] = x, y, vx, vy
 
 
 def moved_in_the_open(
