@@ -97,10 +97,10 @@ class RunOptions(Options):
 class Shard(NamedTuple):
     """One of the shares into which a run is cut, by mazes."""
 
-    index: int  # from 1
+    number: int  # from 1
     of: int
 
     def numbers(self, trials: Sequence[Trial], position: int = 0) -> list[int]:
         """Returns the episodes of the evaluation at some position in a run, all those of a maze or none."""
-        in_turn = (self.index - 1 - position) % self.of
+        in_turn = (self.number - 1 - position) % self.of
         return [number for number, trial in enumerate(trials) if trial.episode.maze % self.of == in_turn]

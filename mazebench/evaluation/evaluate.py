@@ -85,8 +85,8 @@ def evaluate(
     spreads = run.workers or run.cluster or executor
     if spreads and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
-    task = task if isinstance(task, Task) else None
-    return run_evaluation(chosen, out, run, progress, agent_class, task, executor)
+    found = task if isinstance(task, Task) else None
+    return run_evaluation(chosen, out, run, progress, agent_class, found, executor)
 
 
 def run_evaluation(
@@ -117,9 +117,8 @@ def say_remarks(plan: Plan) -> None:
     """Warns of what a user should know before an evaluation."""
     plan.say_remarks()
     if plan.provenance.agent_code_sha256 is None:
-        remark(
-            f"{plan.options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
-        )
+        agent = plan.options.agent
+        remark(f"{agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

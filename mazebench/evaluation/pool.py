@@ -50,8 +50,8 @@ def pool_of(run: RunOptions, executor: concurrent.futures.Executor | None = None
         if run.cluster is not None:
             from mazebench.evaluation.ray_cluster import RayExecutor
 
-            executor = stack.enter_context(RayExecutor(run.cluster))
-            workers = workers or executor.num_cores
+            executor = cluster = stack.enter_context(RayExecutor(run.cluster))
+            workers = workers or cluster.num_cores
         if executor is not None and not workers:
             raise InputError("expected workers with an executor, the number of chunks that it runs at once, found 0")
         yield stack.enter_context(Pool(workers, executor))
@@ -95,15 +95,15 @@ class Pool:
         """
         if self._executor is None:
             for key, plan, chunk in work:
-                for results in run_chunk(plan, chunk):
-                    yield {key: results}
+                for of_step in run_chunk(plan, chunk):
+                    yield {key: of_step}
             return
 
-        work, waiting = iter(work), dict[concurrent.futures.Future[_Ended], Any]()
+        items, waiting = iter(work), dict[concurrent.futures.Future[_Ended], Any]()
         try:
             while True:
                 room = max(0, _CHUNKS_AHEAD * self.num_workers - len(waiting))
-                for key, plan, chunk in itertools.islice(work, room):
+                for key, plan, chunk in itertools.islice(items, room):
                     waiting[self._submit(plan, chunk)] = key
                 if not waiting:
                     return
@@ -112,7 +112,7 @@ class Pool:
                     self._stop.set()
                     running = {future for future in waiting if not future.cancel()}
                     ended = concurrent.futures.wait(running, _LONGEST_STEP).done
-                results: dict[Any, list[Result]] = {}
+                results = dict[Any, list[Result]]()
                 fault: InputError | RunError | None = None
                 for future in ended:
                     key = waiting.pop(future)

@@ -214,11 +214,10 @@ def run_suite(
     for (folder, name), plan in plans.items():
         if (folder, name) not in left_out:
             plan.say_remarks(of_maps=False)
-    stands_for = [plans.get(key) or plans[key[0], firsts[key[1]]] for key in chosen]
-    num_episodes = sum(
-        len(plan.trials if shard is None else shard.numbers(plan.trials, position))
-        for position, plan in enumerate(stands_for)
-    )
+    num_episodes = 0
+    for position, key in enumerate(chosen):
+        trials = (plans.get(key) or plans[key[0], firsts[key[1]]]).trials
+        num_episodes += len(trials if shard is None else shard.numbers(trials, position))
 
     def jobs() -> Iterator[Job]:
         for position, key in enumerate(chosen):
