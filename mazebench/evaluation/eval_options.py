@@ -104,3 +104,6 @@ class Shard(NamedTuple):
         """Returns the episodes of the evaluation at some position in a run, all those of a maze or none."""
         in_turn = (self.number - 1 - position) % self.of
         return [number for number, trial in enumerate(trials) if trial.episode.maze % self.of == in_turn]
+
+
+WHOLE = Shard(1, 1)

@@ -9,14 +9,14 @@ import math
 import pathlib
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from mazebench import stopping
 from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk, Keep, poses_of
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions, eval_options
+from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard, eval_options
 from mazebench.evaluation.measured_oracle import with_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, pool_of
@@ -86,7 +86,9 @@ def evaluate(
     if spreads and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     found = task if isinstance(task, Task) else None
-    return run_evaluation(chosen, out, run, progress, agent_class, found, executor)
+    summary = run_evaluation(chosen, out, run, progress, agent_class, found, executor)
+    assert summary is not None
+    return summary
 
 
 def run_evaluation(
@@ -97,61 +99,58 @@ def run_evaluation(
     agent_class: type[Agent] | None = None,
     task: Task | None = None,
     executor: concurrent.futures.Executor | None = None,
-) -> Summary:
+    shard: Shard = WHOLE,
+) -> Summary | None:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
     `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
-    already.
+    already. Of a `shard` without episodes, None is returned.
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
-    plan.check_spread(run.workers, machines=run.cluster is not None or executor is not None)
-    say_remarks(plan)
-    with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
-        job = Job(plan, out or pathlib.Path(temporary), bool(run.record))
-        (summary,) = run_jobs([job], 1, len(plan.trials), pool, run, progress)
-    return summary
-
-
-def say_remarks(plan: Plan) -> None:
-    """Warns of what a user should know before an evaluation."""
+    plan.check_spread(run.workers, machines=run.cluster is not None or executor is not None or shard != WHOLE)
     plan.say_remarks()
     if plan.provenance.agent_code_sha256 is None:
-        agent = plan.options.agent
-        remark(f"{agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it")
+        remark(
+            f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
+        )
+    episodes = shard.numbers(plan.trials)
+    with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
+        job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
+        summaries = run_jobs([job], 1, len(episodes), pool, run, progress)
+    return summaries[0] if summaries else None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Job:
-    """An evaluation to run in a folder, or some of its episodes, which then get no summary."""
+    """An evaluation to run in a folder, or some of its episodes."""
 
     plan: Plan
     folder: pathlib.Path
     record: bool
+    episodes: Sequence[int]  # by number; without any, nothing is written
     suite: str | None = None
     part: str | None = None
-    share: Sequence[int] | None = None  # of the episodes; None for all
 
-    @property
-    def episodes(self) -> Sequence[int]:
-        """The numbers of the episodes to run."""
-        return range(len(self.plan.trials)) if self.share is None else self.share
+
+class _Running(NamedTuple):
+    """A job that has begun."""
+
+    job: Job
+    store: Store
+    left: set[int]  # the episodes that have not ended
+    closing: contextlib.ExitStack  # of the store
 
 
 def run_jobs(
-    jobs: Iterable[Job],
-    num_jobs: int,
-    num_episodes: int,
-    pool: Pool,
-    run: RunOptions,
-    progress: Progress = lambda ended, of: None,
+    jobs: Iterable[Job], num_jobs: int, num_episodes: int, pool: Pool, run: RunOptions, progress: Progress
 ) -> list[Summary]:
-    """Runs what is left of some evaluations and returns their summaries; a finished one is not run again.
+    """Runs what is left of some evaluations and returns their summaries in order; a finished one is not run again.
 
-    The next one is asked for, and begins, as soon as the pool has room. `num_jobs` and `num_episodes` are of all.
+    The next one is asked for, and begins, when the pool has room. `num_jobs` and `num_episodes` are those of all.
     """
     summaries: dict[int, Summary] = {}
-    running: dict[int, tuple[Job, Store, contextlib.ExitStack]] = {}
+    running: dict[int, _Running] = {}
     num_ended = 0
 
     def advance(by: int) -> None:
@@ -160,39 +159,37 @@ def run_jobs(
         progress(num_ended, num_episodes)
 
     def end_if_whole(index: int) -> None:
-        if index in running and running[index][1].num_ended == len(running[index][0].episodes):
-            job, store, closing = running.pop(index)
+        if index in running and not running[index].left:
+            job, store, _, closing = running.pop(index)
             with closing:
-                if job.share is None:
-                    summaries[index] = _finish(job, store, run.num_envs)
+                summaries[index] = _finish(job, store, run.num_envs)
 
     def work(opened: contextlib.ExitStack) -> Iterator[tuple[int, Plan, Chunk]]:
         for index, job in enumerate(jobs):
-            plan, folder = job.plan, job.folder
-            if run.resume and is_finished(folder, job.record):
-                check_same_run(folder, plan.identity)
-                summaries[index] = load_result(folder).summary
-                advance(len(plan.trials))
+            if run.resume and is_finished(job.folder, job.record):
+                check_same_run(job.folder, job.plan.identity)
+                summaries[index] = load_result(job.folder).summary
+                advance(len(job.episodes))
             elif job.episodes:
                 closing = opened.enter_context(contextlib.ExitStack())
-                closing.enter_context(locked(folder, "evaluation"))
-                store = closing.enter_context(Store(folder, plan, resume=run.resume, record=job.record))
-                running[index] = job, store, closing
-                advance(store.num_ended)
-                missing = sorted(set(job.episodes) & set(store.missing))
+                closing.enter_context(locked(job.folder, "evaluation"))
+                store = closing.enter_context(Store(job.folder, job.plan, resume=run.resume, record=job.record))
+                left = set(job.episodes).intersection(store.missing)
+                running[index] = _Running(job, store, left, closing)
+                advance(len(job.episodes) - len(left))
                 keep = poses_of if store.record else None
-                for chunk in cut(missing, pool, run.num_envs, num_jobs, keep=keep, folder=store.folder):
-                    yield index, plan, chunk
+                for chunk in cut(sorted(left), pool, run.num_envs, num_jobs, keep=keep, folder=store.folder):
+                    yield index, job.plan, chunk
                 end_if_whole(index)
 
     with contextlib.ExitStack() as opened:
         for ended in pool.run(work(opened)):
             for index, results in ended.items():
                 if results:
-                    store = running[index][1]
-                    before = store.num_ended
-                    store.append(results)
-                    advance(store.num_ended - before)
+                    numbers = {result.number for result in results}
+                    running[index].store.append(results)
+                    running[index].left.difference_update(numbers)
+                    advance(len(numbers))
             stopping.check()
             for index in ended:
                 end_if_whole(index)
@@ -211,7 +208,7 @@ def _finish(job: Job, store: Store, num_envs: int) -> Summary:
         suite=job.suite,
         part=job.part,
         benchmark=plan.task.options.benchmark,
-        episodes=len(plan.trials),
+        episodes=len(job.episodes),
         provenance=plan.provenance,
         **metrics.summarize(records),
         pairs={

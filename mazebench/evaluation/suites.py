@@ -13,7 +13,7 @@ from typing import Any
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions, Shard
+from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard
 from mazebench.evaluation.evaluate import Job, Progress, run_jobs
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.evaluation.pool import pool_of
@@ -154,7 +154,7 @@ def run_suite(
     seed: int = 0,
     overrides: Mapping[str, str] | None = None,
     executor: concurrent.futures.Executor | None = None,
-    shard: Shard | None = None,
+    shard: Shard = WHOLE,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -170,7 +170,7 @@ def run_suite(
       seed: of what the agents draw.
       overrides: values of the config of a single agent.
       executor: runs the episodes, as in `mazebench.evaluation.evaluate.evaluate`.
-      shard: of which only the episodes are run; without summaries.
+      shard: whose episodes alone are run, with the summaries of the evaluations in which it has some.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -197,7 +197,7 @@ def run_suite(
                 overrides=overrides or {},
             )
         )
-        plan.check_spread(run.workers, machines=(run.cluster, executor, shard) != (None, None, None))
+        plan.check_spread(run.workers, machines=(run.cluster, executor, shard) != (None, None, WHOLE))
         return plan
 
     # Plans in real buildings are made when they are played, but for the first of a group, which stands for the others.
@@ -214,24 +214,24 @@ def run_suite(
     for (folder, name), plan in plans.items():
         if (folder, name) not in left_out:
             plan.say_remarks(of_maps=False)
-    num_episodes = 0
-    for position, key in enumerate(chosen):
-        trials = (plans.get(key) or plans[key[0], firsts[key[1]]]).trials
-        num_episodes += len(trials if shard is None else shard.numbers(trials, position))
+    episodes = {
+        key: shard.numbers((plans.get(key) or plans[key[0], firsts[key[1]]]).trials, position)
+        for position, key in enumerate(chosen)
+    }
 
     def jobs() -> Iterator[Job]:
-        for position, key in enumerate(chosen):
-            plan = plans.pop(key) if key in plans else planned(agent_of[key[0]], parts[key[1]])
-            folder = out.joinpath(*key)
-            record = not is_finished(folder) if run.record is None else run.record
-            share = None if shard is None else shard.numbers(plan.trials, position)
-            yield Job(plan, folder, record, suite, key[1], share)
+        for key in chosen:
+            if episodes[key]:
+                plan = plans.pop(key) if key in plans else planned(agent_of[key[0]], parts[key[1]])
+                folder = out.joinpath(*key)
+                record = not is_finished(folder) if run.record is None else run.record
+                yield Job(plan, folder, record, episodes[key], suite, key[1])
 
     with pool_of(run, executor) as pool:
         make_folder(out)
         _prepare(out, suite, agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume)
         how = dataclasses.replace(run, resume=True)
-        return run_jobs(jobs(), len(chosen), num_episodes, pool, how, progress)
+        return run_jobs(jobs(), len(chosen), sum(map(len, episodes.values())), pool, how, progress)
 
 
 def _unplayable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> set[tuple[str, str]]:
