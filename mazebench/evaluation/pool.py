@@ -30,7 +30,7 @@ from mazebench.evaluation.eval_options import RunOptions
 from mazebench.evaluation.nodes import check_node, common_of
 from mazebench.evaluation.plan import Plan
 
-_PATIENCE = 0.5  # seconds to wait for a chunk to end before the caller may look for signals
+PATIENCE = 0.5  # seconds to wait for a chunk to end before the caller may look for signals
 _NO_GUARD = 86  # exit status of a worker whose script starts workers again
 _LONGEST_STEP = 10.0  # seconds that a step may take until workers are ended that were asked to stop
 
@@ -107,7 +107,7 @@ class Pool:
                     waiting[self._submit(plan, chunk)] = key
                 if not waiting:
                     return
-                ended = concurrent.futures.wait(waiting, _PATIENCE, concurrent.futures.FIRST_COMPLETED).done
+                ended = concurrent.futures.wait(waiting, PATIENCE, concurrent.futures.FIRST_COMPLETED).done
                 if stopping.is_asked() and not self.is_external:  # chunks that run end after their step
                     self._stop.set()
                     running = {future for future in waiting if not future.cancel()}

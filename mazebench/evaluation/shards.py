@@ -103,10 +103,8 @@ def _ended_shards(folder: pathlib.Path) -> list[pathlib.Path]:
     for number, other in ended.items():
         if other != of or number > of:
             raise InputError(f"{folder}: expected shards of one run, found shards {first}/{of} and {number}/{other}")
-    if missing := [str(number) for number in range(1, of + 1) if number not in ended]:
-        raise InputError(
-            f"{folder}: expected {of} shards that have ended, found {len(ended)}; run {', '.join(missing)}"
-        )
+    if missing := ", ".join(str(number) for number in range(1, of + 1) if number not in ended):
+        raise InputError(f"{folder}: expected {of} shards that have ended, found {len(ended)}; missing: {missing}")
     return [folder / SHARDS / str(number) for number in ended]
 
 
