@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import pathlib
+import signal
 import socket
 import threading
 import time
 
 import pytest
-from faults import TINY
+from faults import TINY, descendants
 from run_folders import FEW, IMPORTS, results_of
 
 from mazebench.evaluation.eval_options import RunOptions
@@ -26,20 +29,22 @@ from ray.cluster_utils import Cluster
 
 NODE = {"include_dashboard": False, "object_store_memory": 80 * 2**20}
 PARTS = tuple(Part(f"near-{size}", TaskOptions(size=size, distances=(1, 2)), 1) for size in (13, 15))
-# Once, the first process that comes to the fifth step of a chunk kills its parent, which is the node.
+# The first process that comes to the fifth step of a chunk kills its parent, which is the node, and itself.
 MORTAL = """
-import os, pathlib, signal, time
+import os, pathlib, signal
 
 class Mortal(Agent):
     def initial_state(self, batch_size):
+        with pathlib.Path(__file__).with_name("chunks").open("a") as file:
+            file.write("x")
         return 0
 
     def act(self, inputs, state, explore=False):
-        killed = pathlib.Path(__file__).with_name("killed")
-        if state == 5 and killed.parent.joinpath("armed").exists() and not killed.exists():
-            killed.touch()
-            os.kill(os.getppid(), signal.SIGKILL)
-            time.sleep(60)
+        armed = pathlib.Path(__file__).with_name("armed")
+        if state == 5 and armed.exists():
+            armed.unlink()
+            for process in (os.getppid(), os.getpid()):
+                os.kill(process, signal.SIGKILL)
         return np.zeros(len(inputs.seed), dtype=int), state + 1
 """
 
@@ -70,9 +75,10 @@ def test_an_evaluation_has_the_same_bytes_though_a_node_is_killed(tmp_path, monk
     monkeypatch.syspath_prepend(tmp_path)
     pathlib.Path("mortal_at_hand.py").write_text(IMPORTS + MORTAL)
     evaluate("mortal_at_hand:Mortal", out="here", record=True, **FEW)
+    pathlib.Path("chunks").unlink()
     pathlib.Path("armed").touch()
     evaluate("mortal_at_hand:Mortal", out="there", cluster="ray", record=True, **FEW)
-    assert pathlib.Path("killed").exists()
+    assert pathlib.Path("chunks").read_text() == "xxx"  # two, of which one was run again
     assert results_of(tmp_path / "there") == results_of(tmp_path / "here")
 
 
@@ -90,14 +96,20 @@ def test_trainings_go_on_where_a_node_was_killed(tmp_path, cluster, nodes):
     def kill_a_node() -> None:
         while not all(len(checkpoints(folder)) > 1 for folder in folders.values()):
             time.sleep(0.05)
-        cluster.remove_node(nodes.pop(), allow_graceful=False)
+        node = nodes.pop()
+        processes = descendants(node.all_processes["raylet"][0].process.pid)
+        cluster.remove_node(node, allow_graceful=False)
+        for process in processes:  # which a node that loses its power would not leave
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
 
     thread = threading.Thread(target=kill_a_node)
     thread.start()
     with RayExecutor("ray") as executor:
         train_seeds(options, TaskOptions(), folders, executor=executor)
     thread.join()
-    assert len(nodes) == 1
+    began = [len(list(folder.glob("tensorboard/*"))) for folder in folders.values()]
+    assert sorted(began) == [1, 2]
     for seed, folder in folders.items():
         train(out=tmp_path / "here" / str(seed), seed=seed, overrides=TINY, **values)
         for name in ("metrics.jsonl", "checkpoints/000000002400/agent.safetensors"):
