@@ -18,7 +18,6 @@ class Common(NamedTuple):
 
     agent: str
     checkpoint: str | None
-    is_shipped: bool  # whether the checkpoint is the agent's own, which may be installed elsewhere
     names: tuple[str, ...] | None  # of the agent's files, in their folder; None if it is in no file
     working_folder: str
     values: dict[str, Any]  # by what a message calls them
@@ -28,8 +27,7 @@ def common_of(agent: str, agent_class: type[Agent], checkpoint: str | None = Non
     """Returns what all machines of a run of an agent must have."""
     files = agent_files(agent, agent_class)
     names = None if files is None else tuple(os.path.relpath(path, files.folder) for path in files.paths)
-    is_shipped = checkpoint is not None and checkpoint == str(agent_class.default_checkpoint())
-    return Common(agent, checkpoint, is_shipped, names, os.getcwd(), _values(agent, agent_class, names, checkpoint))
+    return Common(agent, checkpoint, names, os.getcwd(), _values(agent, agent_class, names, checkpoint))
 
 
 def check_node(common: Common) -> str | None:
@@ -45,8 +43,8 @@ def check_node(common: Common) -> str | None:
         sys.path.insert(0, common.working_folder)
     try:
         agent_class = load_agent_class(common.agent)
-        if common.is_shipped:
-            checkpoint = str(agent_class.default_checkpoint())
+        if checkpoint is not None and not os.path.exists(checkpoint):  # perhaps installed elsewhere
+            checkpoint = str(agent_class.default_checkpoint() or checkpoint)
         values = _values(common.agent, agent_class, common.names, checkpoint)
     except (InputError, OSError) as error:
         raise InputError(f"{node}: {error}") from error

@@ -76,42 +76,38 @@ def merge(folder: pathlib.Path) -> list[Result]:
     Raises:
       InputError: if a share is missing, or they do not belong together; the message names it.
     """
-    parts = _ended_shards(folder)
-    if not (parts[0] / SUITE).exists():
-        return [_merge_evaluation(folder, [part for part in parts if (part / CONFIG).exists()])]
-    suite = read_suite(parts[0])
-    others = [*parts[1:], *([folder] if (folder / SUITE).exists() else [])]
-    for other in others:
-        if (found := read_suite(other)) != suite:
-            values = ((name, value, getattr(suite, name)) for name, value in found)
-            name, value, expected = next(each for each in values if each[1] != each[2])
-            raise InputError(f"{other}: expected {name} {expected} as in {parts[0]}, found {value}")
-    with writing_to(folder):
-        shutil.copyfile(parts[0] / SUITE, folder / SUITE)
-    names = [pathlib.Path(agent, part) for agent in suite.folders.values() for part in suite.parts]
+    parts, names = _ended_shards(folder), [pathlib.Path()]
+    if (parts[0] / SUITE).exists():
+        suite = read_suite(parts[0])
+        for other in [*parts[1:], *([folder] if (folder / SUITE).exists() else [])]:
+            if read_suite(other) != suite:
+                raise InputError(f"{other / SUITE}: expected the content of {parts[0] / SUITE}, found another one")
+        with writing_to(folder):
+            shutil.copyfile(parts[0] / SUITE, folder / SUITE)
+        names = [pathlib.Path(agent, part) for agent in suite.folders.values() for part in suite.parts]
     shares = {name: [part / name for part in parts if (part / name / CONFIG).exists()] for name in names}
+    if not any(shares.values()):
+        raise InputError(f"{folder}: expected evaluations in its shards, found none")
     return [_merge_evaluation(folder / name, found) for name, found in shares.items() if found]
 
 
 def _ended_shards(folder: pathlib.Path) -> list[pathlib.Path]:
     """Returns the folders of all shares of a run, in order."""
-    files = {int(path.stem): path for path in folder.glob(f"{SHARDS}/*.json") if path.stem.isdecimal()}
-    if not files:
+    files = [path for path in folder.glob(f"{SHARDS}/*.json") if path.stem.isdecimal()]
+    ended = {int(path.stem): read_model(path, _Ended, "a shard's").of for path in files}
+    if not ended:
         raise InputError(f"{folder}: expected shards that have ended, found none")
-    ended = {number: read_model(files[number], _Ended, "a shard's").of for number in sorted(files)}
-    first, of = next(iter(ended.items()))
-    for number, other in ended.items():
-        if other != of or number > of:
-            raise InputError(f"{folder}: expected shards of one run, found shards {first}/{of} and {number}/{other}")
+    of = max(ended.values())
+    for number, other in sorted(ended.items()):
+        if other != of:
+            raise InputError(f"{folder}: expected {of} shards, found shard {number}/{other} of another run")
     if missing := ", ".join(str(number) for number in range(1, of + 1) if number not in ended):
         raise InputError(f"{folder}: expected {of} shards that have ended, found {len(ended)}; missing: {missing}")
-    return [folder / SHARDS / str(number) for number in ended]
+    return [folder / SHARDS / str(number) for number in range(1, of + 1)]
 
 
 def _merge_evaluation(folder: pathlib.Path, parts: Sequence[pathlib.Path]) -> Result:
     """Writes an evaluation of which `parts` hold the episodes, and returns it."""
-    if not parts:
-        raise InputError(f"{folder}: expected an evaluation in its shards, found none")
     results = [load_result(part) for part in parts]
     first, identity = results[0].summary, read_json(parts[0] / CONFIG)
     for other in [*parts[1:], *([folder] if (folder / CONFIG).exists() else [])]:
