@@ -164,7 +164,7 @@ class Store:
 
     def finish(self, records: Sequence[Record], summary: Summary) -> None:
         """Writes the results; `records` are those that ended in protocol order, with the oracle's steps."""
-        trajectories = [self._ended[key][1] for key in sorted(self._ended)]
+        trajectories = [self._ended[key][1] for key in sorted(self._ended)] if self.record else []
         with self._keeping_what_is_written():
             pairs = [(each.pair, each.maze) for each in self._plan.task.arena.shown or () if each.pair is not None]
             for number, (pair, maze) in enumerate(pairs, 1):
