@@ -79,6 +79,11 @@ class AgentConfig(Options):
         """True if an evaluation must not be spread over worker processes."""
         return False
 
+    @property
+    def needs_one_machine(self) -> bool:
+        """True if an evaluation must not be spread over machines, as where the agent keeps files."""
+        return self.needs_one_process
+
 
 class _Declarations:
     """Declarations that the class of an agent may make; each has a default."""

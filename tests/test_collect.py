@@ -12,7 +12,7 @@ from processes import run_python
 from run_folders import Killed, kill_after
 
 from mazebench.errors import InputError
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.tasks.task import Task
 
 minari = pytest.importorskip("minari")
@@ -108,7 +108,7 @@ class TestEpisodes:
             assert minari.get_normalized_score(dataset, returns).mean() == pytest.approx(score, abs=1e-6)
 
     def test_they_do_not_depend_on_how_many_run_side_by_side(self, collected, tmp_path):
-        assert_same(episodes_of(collect(tmp_path / "run", num_envs=1)), episodes_of(collected))
+        assert_same(episodes_of(collect(tmp_path / "run", run=RunOptions(num_envs=1))), episodes_of(collected))
 
     def test_the_seed_is_that_of_the_first(self, collected, tmp_path):
         later = list(episodes_of(collected))[1:]

@@ -17,7 +17,7 @@ from hypothesis import strategies
 from run_folders import FEW, Killed, files_of, results_of
 
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.chunk import Chunk, Result, run_chunk
+from mazebench.evaluation.chunk import Chunk, Result, poses_of, run_chunk
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import Plan, make_plan
@@ -38,7 +38,7 @@ def plan() -> Plan:
 @pytest.fixture(scope="module")
 def episodes(plan) -> list[Result]:
     """The results of all episodes of the plan, in its order."""
-    chunk = Chunk(range(len(plan.trials)), num_envs=40, num_threads=0, record=True)
+    chunk = Chunk(range(len(plan.trials)), num_envs=40, num_threads=0, keep=poses_of)
     return sorted(result for results in run_chunk(plan, chunk) for result in results)
 
 

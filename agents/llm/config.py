@@ -118,6 +118,11 @@ class LLMConfig(AgentConfig):
         return self.asks_service
 
     @property
+    def needs_one_machine(self) -> bool:
+        """True: all answers are kept in one file."""
+        return True
+
+    @property
     def key(self) -> str:
         """The key in the environment, empty without one.
 

@@ -16,7 +16,7 @@ from mazebench.options import options_in
 from mazebench.tasks.task_options import TaskOptions
 
 _WITHOUT = (
-    *("resume", "record", "workers"),  # one process collects all
+    *("resume", "record"),  # all or nothing is kept
     *(*EPISODES, "num_goals", "context_size", "reward"),  # as in evaluations, which agents play
 )
 
@@ -42,7 +42,5 @@ def collect(
         stopping.stoppable(lambda: ("nothing is kept; run it again",)),
         progress.evaluating(f"{agent}, {title_of(task)}", progress.Kept()) as show,
     ):
-        collect_demonstrations(
-            options, episodes, out, num_envs=run.num_envs, context_per_step=context_per_step, progress=show
-        )
+        collect_demonstrations(options, episodes, out, run=run, context_per_step=context_per_step, progress=show)
     print(f"{episodes:,} episodes in {out}")

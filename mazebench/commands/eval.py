@@ -15,7 +15,7 @@ from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import NoCache, takes_options
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.eval_options import EPISODES, EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EPISODES, WHOLE, EvalOptions, RunOptions
 from mazebench.options import fields_of, options_in
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
@@ -44,6 +44,13 @@ def evaluate(
     out: Annotated[
         pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
     ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            help="Run one of N shares into OUT/shards, as 3/16, or as slurm for that of this task of an array of "
+            "Slurm's; `mazebench merge OUT` makes one run of them."
+        ),
+    ] = None,
     show_traceback: Annotated[
         bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers.")
     ] = False,
@@ -59,12 +66,13 @@ def evaluate(
         if named := [name for name in values if name in own]:
             raise InputError(f"the suite {suite!r} has evaluations of its own; found --{named[0].replace('_', '-')}")
     run = RunOptions(**options_in(values, RunOptions))
-    if run.resume and out is None:
-        raise InputError("--resume needs --out, the folder of the run to go on with")
+    if (run.resume or shard) and out is None:
+        raise InputError(f"{'--resume' if run.resume else '--shard'} needs --out, the folder of the run")
     load_mujoco(renders=False)
 
     from mazebench.commands.summary_table import print_suite, print_summary
     from mazebench.evaluation.evaluate import run_evaluation
+    from mazebench.evaluation.shards import end_shard, read_shard, shard_folder
     from mazebench.evaluation.suites import run_suite
     from mazebench.results.reading import load_result, read_suite
 
@@ -74,6 +82,10 @@ def evaluate(
     name = suite or f"{agents[0].replace(':', '-')}-{task.task}"
     # The process tells runs apart that start at the same time.
     folder = out or pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
+    share = WHOLE
+    if shard is not None:
+        share = read_shard(shard)
+        folder = shard_folder(folder, share)
     if run.resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")
@@ -88,11 +100,14 @@ def evaluate(
         with stopping.stoppable(how_to_go_on, waits=True):
             with progress.evaluating(title, kept) as show:
                 if suite is None:
-                    summaries = [run_evaluation(options, folder, run, show)]
+                    summary = run_evaluation(options, folder, run, show, shard=share)
+                    summaries = [summary] if summary else []
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
-                    summaries = run_suite(suite, agents, folder, run, show, **chosen)
-            if suite is None:
+                    summaries = run_suite(suite, agents, folder, run, show, shard=share, **chosen)
+            if shard is not None:
+                end_shard(folder, share)
+            elif suite is None:
                 print_summary(summaries[0])
             else:
                 folders = [folder / read_suite(folder).folders[each.agent] / str(each.part) for each in summaries]
@@ -101,4 +116,4 @@ def evaluate(
         if show_traceback and error.__cause__ is not None:
             traceback.print_exception(error.__cause__)
         raise RunError(f"{error}; {kept} in {folder}" if kept.ended else str(error)) from error
-    print(f"results in {folder}")
+    print(f"results in {folder}" + (f"; when all shards have ended: mazebench merge {out}" if shard else ""))

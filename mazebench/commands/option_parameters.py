@@ -77,7 +77,7 @@ def watched_task(values: Mapping[str, Any]) -> Task:
     return task.replace(distances=(min(task.distances, key=lambda distance: abs(distance - 10)),))
 
 
-def parse_numbers(name: str, text: str) -> tuple[int, ...]:
+def parse_numbers(name: str, text: str, least: int = 1) -> tuple[int, ...]:
     """Returns sorted numbers from ranges and commas, as "1-5,8,10"; `name` is the option's, for messages."""
     numbers: set[int] = set()
     for part in text.split(","):
@@ -87,8 +87,8 @@ def parse_numbers(name: str, text: str) -> tuple[int, ...]:
         if int(low) > int(high or low):
             raise InputError(f"expected {name} from low to high, found {part.strip()!r}")
         numbers.update(range(int(low), int(high or low) + 1))
-    if not numbers or min(numbers) < 1:
-        raise InputError(f"expected {name} of 1 or more, found {text!r}")
+    if not numbers or min(numbers) < least:
+        raise InputError(f"expected {name} of {least} or more, found {text!r}")
     return tuple(sorted(numbers))
 
 

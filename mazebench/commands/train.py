@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import pathlib
 from typing import Annotated, Any
 
@@ -10,7 +11,9 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import takes_options
+from mazebench.commands.option_parameters import parse_numbers, takes_options
+from mazebench.errors import InputError
+from mazebench.evaluation.eval_options import read_cluster
 from mazebench.maps.benchmark import SIZES
 from mazebench.options import options_in
 from mazebench.tasks.task_options import LOCAL, TaskOptions
@@ -29,15 +32,34 @@ def train(
         typer.Option(help="The run folder; runs/AGENT-[KINDS-]SIZE-SEED or runs/AGENT-TRACK-LEVEL-SEED if not given."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")] = False,
+    seeds: Annotated[
+        str | None, typer.Option(help="Train once for each of some seeds, as 0-4, into OUT/SEED; with --env-steps.")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(help="Train --seeds on the Ray cluster of this machine, ray, or on that at ray://HOST:PORT."),
+    ] = None,
 ) -> None:
     """Train an agent, on the benchmark's training mazes or others; evaluated on held-out mazes of the same kinds."""
     load_mujoco(renders=False)
+    from mazebench.evaluation.ray_cluster import RayExecutor
     from mazebench.training import loop, run_folder
+    from mazebench.training.seeds import train_seeds
 
     options = TrainOptions(agent=agent, **options_in(values, TrainOptions))
     folder = out or pathlib.Path("runs") / _folder_name(options, values)
+    if (seeds is None and cluster) or (seeds is not None and "seed" in values):
+        raise InputError("expected --seeds, with --cluster and without --seed")
+    read_cluster(cluster)
+    numbers = () if seeds is None else parse_numbers("seeds", seeds, least=0)
+    folders = {
+        seed: out / str(seed) if out else pathlib.Path("runs") / _folder_name(options.replace(seed=seed), values)
+        for seed in numbers
+    }
 
     def how_to_go_on() -> tuple[str, ...]:
+        if seeds is not None:
+            return (f"checkpoints are kept in {next(iter(folders.values())).parent}; go on", "--resume")
         last = next(reversed(run_folder.checkpoints(folder)), None)
         if last is None:
             return ("nothing is kept; run it again",)
@@ -47,8 +69,13 @@ def train(
     with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
         task_options = {name: value for name, value in options_in(values, TaskOptions).items() if name != "task"}
         asked = TaskOptions(task=options.task[0], **task_options)
-        loop.run_training(options, asked, folder, resume, show)
-    print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
+        if seeds is None:
+            loop.run_training(options, asked, folder, resume, show)
+        else:
+            with RayExecutor(cluster) if cluster else contextlib.nullcontext() as executor:
+                train_seeds(options, asked, folders, resume, executor, show)
+    for each in folders.values() or [folder]:
+        print(f"run in {each}; evaluate it by: mazebench eval --agent {agent} --checkpoint {each}")
 
 
 def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:

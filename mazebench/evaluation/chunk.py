@@ -55,7 +55,7 @@ class Chunk(NamedTuple):
     numbers: Sequence[int]  # of the plan's trials
     num_envs: int  # environments side by side
     num_threads: int  # of the simulation; 0 for all cores
-    record: bool  # whether trajectories are wanted
+    keep: Keep | None = None  # what to keep of each moment of the episodes
     folder: pathlib.Path | None = None  # of the results
 
 
@@ -101,9 +101,10 @@ def run_chunk(plan: Plan, chunk: Chunk) -> Iterator[list[Result]]:
         chunk.num_threads,
         seed=plan.options.seed,
         needs_truth=plan.agent_class.needs_truth,
-        keep=_poses if chunk.record else None,
+        keep=chunk.keep,
     ):
-        yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
+        # Poses are packed for their way to another process.
+        yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.keep is poses_of else results
 
 
 def run_trials(
@@ -189,7 +190,7 @@ def run_trials(
             yield results
 
 
-def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:
+def poses_of(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:
     """Returns `[B, 6]` float32: the true and the observed poses, x and y in metres and yaw in rad."""
     poses = np.column_stack([info["position"], info["yaw"], observation["state"][:, (X, Y, YAW)]])
     return poses.astype(np.float32)  # type: ignore[return-value]  # an array is as good as a sequence

@@ -6,6 +6,7 @@ arrays; those that are privileged are for training.
 
 from __future__ import annotations
 
+import concurrent.futures
 import dataclasses
 import io
 import pathlib
@@ -23,8 +24,10 @@ from mazebench.envs.env_spec import env_spec_of
 from mazebench.envs.spaces import action_space, observation_space
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Result, run_trials
-from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions
-from mazebench.evaluation.plan import Plan, build_agent, make_plan
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
+from mazebench.evaluation.evaluate import cut
+from mazebench.evaluation.plan import Plan, make_plan
+from mazebench.evaluation.pool import pool_of
 from mazebench.results.naming import described, title_of
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.episode import sample_episode
@@ -40,6 +43,7 @@ try:
 except ModuleNotFoundError as error:
     raise InputError("mazebench collect needs Minari, which the extra [minari] brings (docs/start.md)") from error
 
+_DEFAULT_RUN = RunOptions()
 _NUM_REFERENCE = 20  # episodes at most, in which the scores are measured that stand for 0 and 1
 
 
@@ -48,9 +52,10 @@ def collect_demonstrations(
     num_episodes: int,
     folder: pathlib.Path,
     *,
-    num_envs: int = NUM_ENVS,
+    run: RunOptions = _DEFAULT_RUN,
     context_per_step: bool = False,
     progress: Callable[[int, int], None] = lambda ended, of: None,
+    executor: concurrent.futures.Executor | None = None,
 ) -> None:
     """Writes demonstrations of an agent as the data set `folder`, all or nothing.
 
@@ -58,9 +63,10 @@ def collect_demonstrations(
       options: the agent, the task, and the seed of the first episode.
       num_episodes: how many.
       folder: a new or an empty one.
-      num_envs: environments side by side, at most.
+      run: how; nothing is resumed.
       context_per_step: whether each observation has its context; else the infos have each context once.
       progress: called as episodes end, with their number and that of all.
+      executor: plays the episodes, as in `mazebench.evaluation.evaluate.evaluate`.
 
     Raises:
       InputError: if an option can't be met, the mazes are those of the split eval, or `folder` is not empty or can't be
@@ -77,6 +83,7 @@ def collect_demonstrations(
         if folder.exists() and (found := sorted(path.name for path in folder.iterdir())):
             raise InputError(f"{folder}: expected a new or an empty folder, found {found[0]!r} in it")
         plan = make_plan(options, trials=(), resolver=resolve)
+        plan.check_spread(run.workers, machines=run.cluster is not None or executor is not None)
         plan.say_remarks()
         shutil.rmtree(temporary, ignore_errors=True)
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -92,7 +99,8 @@ def collect_demonstrations(
                 jpeg_encoding=False,  # which would change pictures
             )
             trials = _trials_of(plan, num_episodes)
-            episodes = _play(plan, trials, num_envs, progress)
+            plan = dataclasses.replace(plan, trials=trials)  # type: ignore[arg-type]  # by number is as good
+            episodes = _play(plan, trials, run, progress, executor)
             metadata = _reference_scores(task, dict(list(trials.items())[:_NUM_REFERENCE]), options.seed)
             strengths = task.options.active_perturbations
             name = title_of(task.options) if task.options.track else f"{task.options.task}-{task.size}"
@@ -133,16 +141,20 @@ def _trials_of(plan: Plan, num_episodes: int) -> dict[int, Trial]:
 
 
 def _play(
-    plan: Plan, trials: Mapping[int, Trial], num_envs: int, progress: Callable[[int, int], None]
+    plan: Plan,
+    trials: Mapping[int, Trial],
+    run: RunOptions,
+    progress: Callable[[int, int], None],
+    executor: concurrent.futures.Executor | None,
 ) -> list[EpisodeBuffer]:
-    """Returns the episodes; calls `progress` as they end."""
-    agent, truth = build_agent(plan.options, plan.task, plan.agent_class), plan.agent_class.needs_truth
+    """Returns the episodes of a plan; calls `progress` as they end."""
     played: dict[int, EpisodeBuffer] = {}
-    for results in run_trials(
-        agent, plan.task, trials, num_envs, seed=plan.options.seed, needs_truth=truth, keep=_moments
-    ):
-        played |= {result.number: _demonstration(plan.task, trials[result.number], result) for result in results}
-        progress(len(played), len(trials))
+    with pool_of(run, executor) as pool:
+        chunks = cut(list(trials), pool, run.num_envs, keep=_moments)
+        for ended in pool.run((None, plan, chunk) for chunk in chunks):
+            for result in ended.get(None, []):
+                played[result.number] = _demonstration(plan.task, trials[result.number], result)
+            progress(len(played), len(trials))
     return [played[number] for number in trials]
 
 

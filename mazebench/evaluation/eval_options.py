@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Interval
 
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
-from mazebench.options import Doc, Options, Overrides, options_in
+from mazebench.errors import InputError
+from mazebench.options import Doc, Options, Overrides, ReadBy, options_in
 from mazebench.tasks.task import Task, as_asked, options_of
 from mazebench.tasks.task_options import TaskOptions
+
+if TYPE_CHECKING:
+    from mazebench.tasks.trials import Trial
 
 EPISODES = ("episodes_per_distance", "episodes_per_maze")  # fields that say how many episodes there are
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
@@ -59,6 +64,17 @@ def eval_options(agent: str, task: str | Task | TaskOptions = "local", **options
     return EvalOptions.of(of_evaluation, agent=agent, task=options_of(as_asked(task, of_task)))
 
 
+def read_cluster(cluster: str | None) -> str | None:
+    """Returns the name of a cluster.
+
+    Raises:
+      InputError: if it is not one of Ray.
+    """
+    if cluster not in (None, "ray") and not str(cluster).startswith("ray://"):
+        raise InputError(f"expected --cluster ray or ray://HOST:PORT, found {cluster!r}")
+    return cluster
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunOptions(Options):
     """Options of the run of an evaluation, which make no difference to its results.
@@ -71,3 +87,23 @@ class RunOptions(Options):
     record: Annotated[bool | None, Doc("Write trajectories too; a suite does by default.")] = None
     num_envs: Annotated[int, Ge(1), Doc("Environments side by side in each process, at most.")] = NUM_ENVS
     workers: Annotated[int, Ge(0), Doc("Processes; 0 runs in this one.")] = 0
+    cluster: Annotated[
+        str | None,
+        ReadBy(read_cluster),
+        Doc("Run on the Ray cluster of this machine, ray, or on that at ray://HOST:PORT; --workers tasks at once."),
+    ] = None
+
+
+class Shard(NamedTuple):
+    """One of the shares into which a run is cut, by mazes."""
+
+    number: int  # from 1
+    of: int
+
+    def numbers(self, trials: Sequence[Trial], position: int = 0) -> list[int]:
+        """Returns the episodes of the evaluation at some position in a run, all those of a maze or none."""
+        in_turn = (self.number - 1 - position) % self.of
+        return [number for number, trial in enumerate(trials) if trial.episode.maze % self.of == in_turn]
+
+
+WHOLE = Shard(1, 1)

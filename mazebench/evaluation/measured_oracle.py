@@ -20,23 +20,24 @@ _ORACLE = "oracle"
 
 
 def with_oracle_steps(plan: Plan, records: Sequence[Record], num_envs: int) -> list[Record]:
-    """Returns the records of all of a plan's episodes with the oracle's steps.
+    """Returns the records of a plan's episodes, all legs of each, with the oracle's steps.
 
     Those of a leg after a missed goal are of a drive of its own, which begins at rest in the middle of the leg's start.
     """
-    if all(leg.oracle_steps is not None for trial in plan.trials for leg in trial.legs):
+    trials = [plan.trials[number] for number in dict.fromkeys(record.episode for record in records)]
+    if all(leg.oracle_steps is not None for trial in trials for leg in trial.legs):
         steps = [record.oracle_steps for record in records]
     elif plan.options.agent == _ORACLE:
         steps = [record.steps if record.success else None for record in records]
     else:
-        steps = list(itertools.chain.from_iterable(measure_steps_of_legs(plan.task, plan.trials, num_envs)))
+        steps = list(itertools.chain.from_iterable(measure_steps_of_legs(plan.task, trials, num_envs)))
 
     if missed := [number for number, record in enumerate(records) if record.after_missed_goal]:
-        trials = []
+        drives = []
         for record in (records[number] for number in missed):
             episode = dataclasses.replace(plan.trials[record.episode].episode, start=record.start, goal=record.goal)
-            trials.append(Trial(episode, record.distance, record.shortest_path))
-        alone = measure_oracle_steps(plan.task.replace(num_goals=1), trials, num_envs)
+            drives.append(Trial(episode, record.distance, record.shortest_path))
+        alone = measure_oracle_steps(plan.task.replace(num_goals=1), drives, num_envs)
         for number, each in zip(missed, alone, strict=True):
             steps[number] = each
     return [record.model_copy(update={"oracle_steps": each}) for record, each in zip(records, steps, strict=True)]

@@ -74,9 +74,11 @@ class Plan:
         chosen, usual = (config.identity() if config else {} for config in configs)
         return {name: value for name, value in chosen.items() if value != usual[name]}
 
-    def check_workers(self, workers: int) -> None:
-        """Raises `InputError` if worker processes are asked for, and the agent's config rules them out."""
+    def check_spread(self, workers: int, machines: bool = False) -> None:
+        """Raises `InputError` if the agent's config rules out worker processes or other machines that are asked for."""
         config = config_of(self.options, self.agent_class)
+        if machines and config is not None and config.needs_one_machine:
+            raise InputError(f"agent {self.options.agent!r}: expected one machine, found a cluster, executor or shard")
         if workers and config is not None and config.needs_one_process:
             raise InputError(f"agent {self.options.agent!r}: expected no --workers with this config, found {workers}")
 

@@ -13,7 +13,7 @@ import struct
 import sys
 from collections.abc import Sequence
 from importlib import metadata
-from typing import Any
+from typing import Any, NamedTuple
 
 from mazebench.agent import Agent
 from mazebench.agent_loading import package_of
@@ -60,7 +60,7 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
         "episodes_per_distance": options.episodes_per_distance,
         "command": [one_line(word) for word in (pathlib.Path(sys.argv[0]).name, *sys.argv[1:])],
         "python": platform.python_version(),
-        "packages": {name: _version(name) for name in _PACKAGES},
+        "packages": package_versions(),
         "machine": {
             "system": platform.system(),
             "release": platform.release(),
@@ -72,12 +72,27 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
 
 
+class Files(NamedTuple):
+    """Python files, and the folder in which they have their names."""
+
+    paths: Sequence[pathlib.Path]
+    folder: pathlib.Path
+
+
 def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
-    """Returns the SHA-256 of the names and contents of an agent's Python files, which may be edited before a resume.
+    """Returns the SHA-256 of the names and contents of an agent's files, which may be edited before a resume.
+
+    None for a class in no file, as of a notebook or an archive.
+    """
+    files = agent_files(agent, agent_class)
+    return None if files is None else files_hash(*files)
+
+
+def agent_files(agent: str, agent_class: type[Agent]) -> Files | None:
+    """Returns an agent's Python files; None for a class in no file.
 
     Of an installed agent, they are all files of its package. Of a `module:Class`, they are the files of those modules
-    that are loaded from its package or, of a single file, from the folder that it lies in and those below. None for a
-    class in no file, as of a notebook or an archive.
+    that are loaded from its package or, of a single file, from the folder that it lies in and those below.
     """
     try:
         file = pathlib.Path(inspect.getfile(agent_class)).absolute()
@@ -88,7 +103,7 @@ def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
     name = agent_class.__module__.partition(".")[0]
     folders = tuple(map(pathlib.Path, getattr(sys.modules[name], "__path__", ())))
     if folders and ":" not in agent:
-        return _package_hash(folders)
+        return _package_files(folders)
 
     # The loaded files of the package, or those next to a single file that are no installed ones.
     loaded = {
@@ -102,15 +117,20 @@ def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
         beside = {path for path, package in loaded.items() if file.parent in path.parents and package not in _OTHERS}
         files = {path for path in beside if _STANDARD not in path.parents and not _INSTALLED & set(path.parts)}
     files = {path for path in files if path.is_file()} | {file}
-    return _files_hash(sorted(files), folders[0].absolute() if folders else file.parent)
+    return Files(sorted(files), folders[0].absolute() if folders else file.parent)
+
+
+def own_files() -> Files:
+    """Returns the files of mazebench itself, without its agents."""
+    return _package_files((pathlib.Path(__file__).parents[1],))
 
 
 @functools.cache
-def _package_hash(folders: tuple[pathlib.Path, ...]) -> str:
-    return _files_hash([path for folder in folders for path in sorted(folder.rglob("*.py"))], folders[0])
+def _package_files(folders: tuple[pathlib.Path, ...]) -> Files:
+    return Files([path for folder in folders for path in sorted(folder.rglob("*.py"))], folders[0])
 
 
-def _files_hash(files: Sequence[pathlib.Path], folder: pathlib.Path) -> str:
+def files_hash(files: Sequence[pathlib.Path], folder: pathlib.Path) -> str:
     """Returns the SHA-256 of the names in a folder and the contents of files."""
     digest = hashlib.sha256()
     for path in files:
@@ -150,6 +170,11 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
 
 
 _distributions = functools.cache(metadata.packages_distributions)  # takes 0.4 s
+
+
+def package_versions(*others: str) -> dict[str, str | None]:
+    """Returns the versions of the packages that results may depend on; None of one that is not installed."""
+    return {name: _version(name) for name in (*_PACKAGES, *others)}
 
 
 def _version(package: str) -> str | None:

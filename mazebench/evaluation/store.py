@@ -63,6 +63,17 @@ class _Line(pydantic.BaseModel):
     trajectory: tuple[()] | tuple[list[_Pose], list[_Pose] | None]
 
 
+def write_results(
+    folder: pathlib.Path, records: Sequence[Record], trajectories: Sequence[Trajectory], summary: Summary
+) -> None:
+    """Writes the files of a finished evaluation, with the trajectories of all records or of none."""
+    with open_whole(folder / EPISODES) as file:
+        file.write("".join(each.to_line() for each in records).encode("utf-8"))
+    if trajectories:
+        save_trajectories(folder / TRAJECTORIES, trajectories)
+    write_json(folder / SUMMARY, summary.to_dict())
+
+
 class Store:
     """The episodes that have ended of one evaluation, on disk and in memory; a context manager."""
 
@@ -152,18 +163,14 @@ class Store:
         self._ended |= ended
 
     def finish(self, records: Sequence[Record], summary: Summary) -> None:
-        """Writes the results; `records` are those of all episodes in protocol order, with the oracle's steps."""
-        trajectories = [self._ended[key][1] for key in sorted(self._ended)]
+        """Writes the results; `records` are those that ended in protocol order, with the oracle's steps."""
+        trajectories = [self._ended[key][1] for key in sorted(self._ended)] if self.record else []
         with self._keeping_what_is_written():
-            with open_whole(self.folder / EPISODES) as file:
-                file.write("".join(each.to_line() for each in records).encode("utf-8"))
-            if self.record:
-                save_trajectories(self.folder / TRAJECTORIES, [each for each in trajectories if each])
             pairs = [(each.pair, each.maze) for each in self._plan.task.arena.shown or () if each.pair is not None]
             for number, (pair, maze) in enumerate(pairs, 1):
                 name = f"pair-{number}.png" if len(pairs) > 1 else "pair.png"
                 write_image(draw_pair(pair, maze), self.folder / name)
-            write_json(self.folder / SUMMARY, summary.to_dict())
+            write_results(self.folder, records, [each for each in trajectories if each], summary)
             (self.folder / JOURNAL).unlink(missing_ok=True)
 
     @contextlib.contextmanager

@@ -5,17 +5,18 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import dataclasses
 import pathlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions
-from mazebench.evaluation.evaluate import Progress, run_plan
+from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard
+from mazebench.evaluation.evaluate import Job, Progress, run_jobs
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
-from mazebench.evaluation.pool import Pool
+from mazebench.evaluation.pool import pool_of
 from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import DEV, SIZES, manifest_hash
 from mazebench.maps.real_buildings import PREFIX, RIGHT, Building, buildings, is_real
@@ -152,6 +153,8 @@ def run_suite(
     checkpoint: str | None = None,
     seed: int = 0,
     overrides: Mapping[str, str] | None = None,
+    executor: concurrent.futures.Executor | None = None,
+    shard: Shard = WHOLE,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -166,6 +169,8 @@ def run_suite(
       checkpoint: of a single agent.
       seed: of what the agents draw.
       overrides: values of the config of a single agent.
+      executor: runs the episodes, as in `mazebench.evaluation.evaluate.evaluate`.
+      shard: whose episodes alone are run, with the summaries of the evaluations in which it has some.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -192,7 +197,7 @@ def run_suite(
                 overrides=overrides or {},
             )
         )
-        plan.check_workers(run.workers)
+        plan.check_spread(run.workers, machines=(run.cluster, executor, shard) != (None, None, WHOLE))
         return plan
 
     # Plans in real buildings are made when they are played, but for the first of a group, which stands for the others.
@@ -209,27 +214,24 @@ def run_suite(
     for (folder, name), plan in plans.items():
         if (folder, name) not in left_out:
             plan.say_remarks(of_maps=False)
-    with Pool(run.workers) as pool:
+    episodes = {
+        key: shard.numbers((plans.get(key) or plans[key[0], firsts[key[1]]]).trials, position)
+        for position, key in enumerate(chosen)
+    }
+
+    def jobs() -> Iterator[Job]:
+        for key in chosen:
+            if episodes[key]:
+                plan = plans.pop(key) if key in plans else planned(agent_of[key[0]], parts[key[1]])
+                folder = out.joinpath(*key)
+                record = not is_finished(folder) if run.record is None else run.record
+                yield Job(plan, folder, record, episodes[key], suite, key[1])
+
+    with pool_of(run, executor) as pool:
         make_folder(out)
         _prepare(out, suite, agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume)
-        counts = {key: len(plans.get(key, plans[key[0], firsts[key[1]]]).trials) for key in chosen}
-        summaries, before, total = [], 0, sum(counts.values())
-        for folder, name in chosen:
-            key = folder, name
-            plan = plans.pop(key) if key in plans else planned(agent_of[folder], parts[name])
-            record = not is_finished(out / folder / name) if run.record is None else run.record
-            summary = run_plan(
-                plan,
-                out / folder / name,
-                pool,
-                dataclasses.replace(run, resume=True, record=record),
-                lambda ended, of, before=before: progress(before + ended, total),  # type: ignore[misc]
-                suite=suite,
-                part=name,
-            )
-            summaries.append(summary)
-            before += counts[folder, name]
-    return summaries
+        how = dataclasses.replace(run, resume=True)
+        return run_jobs(jobs(), len(chosen), sum(map(len, episodes.values())), pool, how, progress)
 
 
 def _unplayable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> set[tuple[str, str]]:

@@ -16,7 +16,7 @@ from mazebench.maps.real_buildings import PREFIX, is_real
 from mazebench.results.metrics import by_fact, scores
 from mazebench.results.naming import described, order, own_in_words, setting_of
 from mazebench.results.played import Shown, played_task, shown_of
-from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
+from mazebench.results.reading import EPISODES, JOURNAL, SHARDS, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.tasks.episode import Episode
@@ -167,13 +167,13 @@ def at_common_distances(episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def _find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
-    """Returns the evaluation folders at or below `paths`, also unfinished ones; each once, and no hidden ones."""
+    """Returns the evaluation folders at or below `paths`, also unfinished ones; each once, none hidden, no shards."""
     found: dict[pathlib.Path, pathlib.Path] = {}
     for path in paths:
         for folder, subfolders, files in os.walk(path):
             if not {SUMMARY, EPISODES, JOURNAL}.isdisjoint(files):
                 found.setdefault(pathlib.Path(folder).resolve(), pathlib.Path(folder))
-            subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
+            subfolders[:] = sorted(name for name in subfolders if not name.startswith(".") and name != SHARDS)
     return list(found.values())
 
 

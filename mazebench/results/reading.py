@@ -17,6 +17,7 @@ JOURNAL = "journal.jsonl"
 EPISODES = "episodes.jsonl"
 SUMMARY = "summary.json"
 SUITE = "suite.json"
+SHARDS = "shards"  # the folder of the shares of a run
 
 _Model = TypeVar("_Model", bound=pydantic.BaseModel)
 
@@ -55,7 +56,7 @@ def load_result(folder: pathlib.Path) -> Result:
     """
     if not (folder / SUMMARY).is_file():
         raise InputError(f"{folder}: expected a finished evaluation, found {_describe_content(folder)}")
-    summary = _read_model(folder / SUMMARY, Summary, "an evaluation's summary")
+    summary = read_model(folder / SUMMARY, Summary, "an evaluation's summary")
     with open_file(folder / EPISODES, "records") as file:
         lines = file.readlines()
     records = tuple(
@@ -69,7 +70,7 @@ def load_result(folder: pathlib.Path) -> Result:
 
 def read_suite(folder: pathlib.Path) -> Suite:
     """Returns what a suite's folder says of its content."""
-    return _read_model(folder / SUITE, Suite, "a suite's parts and folders")
+    return read_model(folder / SUITE, Suite, "a suite's parts and folders")
 
 
 def find_parts(folder: pathlib.Path) -> dict[str, pathlib.Path]:
@@ -100,7 +101,8 @@ def find_parts(folder: pathlib.Path) -> dict[str, pathlib.Path]:
     return parts
 
 
-def _read_model(path: pathlib.Path, model: type[_Model], kind: str) -> _Model:
+def read_model(path: pathlib.Path, model: type[_Model], kind: str) -> _Model:
+    """Returns the value in a JSON file, which a message calls a `kind`."""
     with open_file(path, "file") as file:
         return _validate(file.read(), model, str(path), kind)
 
