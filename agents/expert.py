@@ -57,7 +57,13 @@ class Expert:
     """Costs of actions in B environments; the ways to a goal are computed once for each leg."""
 
     def __init__(self, mazes: Mazes, num_envs: int, body: Body):
-        """Knows `mazes`, which have one size and one cell size, and the body that drives in them."""
+        """Knows `mazes`, which have one size and one cell size, and the body that drives in them.
+
+        Raises:
+          InputError: if the body rolls.
+        """
+        if not body.strafes:
+            raise InputError(f"the expert: expected a body that slides, found {body.name!r}")
         self._mazes, self._body = mazes, body
         self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course
         self._arrays: tuple[np.ndarray, ...] = ()  # walls, ways left and goals of the courses

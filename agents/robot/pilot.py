@@ -15,6 +15,7 @@ from .moving_body import BACKWARD, FORWARD, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, 
 _LOOKAHEAD = 0.8  # m along the path to the point aimed at
 _SEGMENTS_AHEAD = 3  # searched for the nearest one; with more, the nearest could be one of a parallel corridor
 _LARGEST_MISALIGNMENT = math.radians(20)  # between a drive and the aim, before the body turns
+_STRAIGHT, _ARC = math.radians(8), math.radians(35)  # the most of a rolling body's, before it drives an arc, or turns
 # The headings of the four drives, in the order of their actions.
 _DRIVES = (
     (FORWARD, 0.0),
@@ -27,16 +28,29 @@ _DRIVES = (
 def steer(body: MovingBody, aim: Point, strafes: bool) -> int:
     """Returns the drive nearest to the direction of `aim`, or a turn if even that one is far off.
 
-    `strafes` says whether the body can strafe.
+    `strafes` says whether there are the two actions by which a body strafes, or a rolling one drives an arc.
     """
     # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
     x, y = body.rest()
-    bearing = math.atan2(aim[1] - y, aim[0] - x) - body.yaw
+    bearing = math.atan2(aim[1] - y, aim[0] - x) - body.yaw - body.model.rest_turn(body.turn)
+    if not body.model.strafes:
+        return _roll(wrap_angle(bearing), strafes)
     drive, heading = min(_DRIVES if strafes else _DRIVES[:2], key=lambda drive: abs(wrap_angle(bearing - drive[1])))
     misalignment = wrap_angle(bearing - heading)
     if abs(misalignment) <= _LARGEST_MISALIGNMENT:
         return drive
     return LOOK_LEFT if misalignment > 0 else LOOK_RIGHT
+
+
+def _roll(bearing: float, arcs: bool) -> int:
+    """Returns the drive of a rolling body towards an aim at a bearing from its heading, in [-pi, pi) rad."""
+    behind = wrap_angle(bearing - math.pi)
+    if min(abs(bearing), abs(behind)) <= _STRAIGHT:
+        return FORWARD if abs(bearing) < abs(behind) else BACKWARD
+    if arcs and abs(bearing) <= _ARC:
+        return STRAFE_LEFT if bearing > 0 else STRAFE_RIGHT
+    off = bearing if abs(bearing) < abs(behind) else behind
+    return LOOK_LEFT if off > 0 else LOOK_RIGHT
 
 
 class Pilot:
@@ -49,7 +63,7 @@ class Pilot:
         self.segment = 0  # the body is on the way from points[segment] to the next
 
     def action(self, body: MovingBody, strafes: bool) -> int:
-        """Returns the drive or turn that brings the body, which strafes or not, towards the aim."""
+        """Returns the drive or turn that brings the body towards the aim; see `steer`."""
         # The segment nearest to where the body comes to rest, this one or one of the next, and how far along it that
         # is. Centres of neighbouring cells are 1 apart. Of equally near segments, the last one.
         x, y = body.rest()

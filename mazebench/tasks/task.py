@@ -200,6 +200,8 @@ def resolve(
             f"body {body.name!r}: expected cells of at least {2 * body.reach:g} m, through which it passes, "
             f"found {arena.cell_size:g} m"
         )
+    if asked.actions == "velocity" and not body.strafes:
+        raise InputError(f"body {body.name!r}: can't strafe, so expected actions six, four or diff, found 'velocity'")
     split, level = asked.split or "train", asked.level or (() if asked.track is None else LEVELS[:1])
     if asked.track is not None:
         arena.require_levels(asked.track, level)
