@@ -12,7 +12,7 @@ from mazebench.world.angles import wrap_angle
 
 from .moving_body import BACKWARD, FORWARD, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, MovingBody, Point
 
-_LOOKAHEAD = 0.8  # m along the path to the point aimed at
+_LOOKAHEAD, _ROLLING_LOOKAHEAD = 0.8, 0.4  # m along the path to the point aimed at; a rolling body cuts no corners
 _SEGMENTS_AHEAD = 3  # searched for the nearest one; with more, the nearest could be one of a parallel corridor
 _LARGEST_MISALIGNMENT = math.radians(20)  # between a drive and the aim, before the body turns
 _STRAIGHT, _ARC = math.radians(8), math.radians(35)  # the most of a rolling body's, before it drives an arc, or turns
@@ -59,7 +59,7 @@ class Pilot:
     def __init__(self, path: Sequence[Cell], size: int, cells_per_metre: float):
         """Begins a path of cells on a map of `size` cells a side."""
         self.points: list[Point] = [(x, y) for x, y in cell_to_point(np.array(path), size).tolist()]
-        self.lookahead = cells_per_metre * _LOOKAHEAD  # cells
+        self.cells_per_metre = cells_per_metre
         self.segment = 0  # the body is on the way from points[segment] to the next
 
     def action(self, body: MovingBody, strafes: bool) -> int:
@@ -76,8 +76,8 @@ class Pilot:
             if distance <= least:
                 least, along, self.segment = distance, share, index
 
-        # The aim is the point `lookahead` ahead of it on the path, or the path's end if that is nearer.
-        along += self.lookahead
+        # The aim is a point ahead of it on the path, or the path's end if that is nearer.
+        along += self.cells_per_metre * (_LOOKAHEAD if body.model.strafes else _ROLLING_LOOKAHEAD)
         for start, end in zip(self.points[self.segment :], self.points[self.segment + 1 :], strict=False):
             if along <= 1:
                 return steer(
