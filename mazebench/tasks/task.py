@@ -30,7 +30,8 @@ NOT_IN_EVALUATIONS = ("fresh", *_NOT_VARIED, "context_size")  # agents choose th
 
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
 # Options by which mazes are read or drawn.
-_OF_MAZES = {"task", "size", "split", "mazes", "shown", "align", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions)}
+_OF_MAZES = {"task", "size", "split", "mazes", "shown", "align", "kinds", "num_mazes", "fresh", "body"}
+_OF_MAZES |= set(fields_of(ReadOptions))
 
 
 @dataclasses.dataclass(frozen=True)

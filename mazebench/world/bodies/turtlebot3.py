@@ -1,8 +1,8 @@
 """The TurtleBot3 of ROBOTIS, a small differential drive, as burger and as waffle.
 
-Radius, height, mass, speed and turn rate are those of its e-manual, the accelerations those of the dynamic window in its
-package turtlebot3_navigation. The lidar is where its model for ROS, turtlebot3_description, has it. A burger comes
-without a camera; we put one in front.
+Radius, height, mass, speed and turn rate are those of its e-manual. The accelerations are those of the dynamic window
+in its package turtlebot3_navigation. The lidar is where its model for ROS, turtlebot3_description, has it. A burger
+comes without a camera, and we put one in front.
 """
 
 import dataclasses
