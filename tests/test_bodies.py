@@ -27,7 +27,6 @@ mazebench.world.__path__.insert(0, sys.argv[1])
 import mazebench
 from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.trials import select_trials
-from mazebench.world.bodies import BODIES
 
 maze, folder = load_mazes(13, "train")[0], sys.argv[2]
 for agent in ("oracle", "navigator"):
@@ -36,7 +35,7 @@ for agent in ("oracle", "navigator"):
         mazebench.evaluate(
             agent, mazes=maze, distances=[4, 9], episodes_per_distance=2, body=body, sensors="lidar", out=out
         )
-frozen = [select_trials(mazebench.Task.of(split="eval", distances=[15], body=body), 1) for body in BODIES]
+frozen = [select_trials(mazebench.Task.of(split="eval", distances=[15], body=body), 1) for body in ("slider", "cart")]
 print(json.dumps([[(trial.shortest_path, trial.oracle_steps) for trial in trials] for trials in frozen]))
 """
 
@@ -49,7 +48,7 @@ def test_the_default_body_is_not_written():
     assert Task.from_json(task.options.to_json() | {"body": "slider"}) == task
     with pytest.raises(InputError, match="body"):
         Task.of(body="zeppelin")
-    assert BODIES == {"slider": SLIDER}
+    assert list(BODIES) == ["slider", "turtlebot3", "turtlebot3-waffle", "service"]
 
 
 def test_a_slower_body_has_more_time():

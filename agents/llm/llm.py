@@ -19,7 +19,7 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from ..robot.cells import marked_cell
 from ..robot.driving import Drive
 from ..robot.map_matching import orientations
-from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
+from ..robot.moving_body import PLAYED, as_kind, has_all_six
 from ..robot.occupancy import SURE
 from ..robot.senses import Memory, Senses, range_sensor, report
 from .answer import Answer
@@ -92,6 +92,7 @@ class LLM(Agent):
         if side != size:
             raise UnplayableError(f"agent 'llm': expected the building's {size} x {size} cells, found {side} x {side}")
         self._config, self._kind, self._senses = config, interface.actions, Senses(interface, "llm")
+        self._body = interface.body
         self._answers, self._flaws = Answers(config, folder), {""}
         # For each way in which the map may be turned, the place of each of its cells on the turned map, as numbers.
         turned = orientations(np.arange(size**2).reshape(size, size), 8)
@@ -131,9 +132,9 @@ class LLM(Agent):
             (turn, row, column), size = driver.placement, len(driver.situation.walls)
             numbers = [self._turned[turn, r * size + c].item() for r, c in driver.route]
             path = [(number // size - row, number % size - column) for number in numbers]
-            (walls, _), strafes = driver.memory.estimate(), self._kind not in WITHOUT_STRAFING
+            (walls, _), strafes = driver.memory.estimate(), has_all_six(self._kind, self._body)
             state[slot], actions[slot] = driver, driver.drive.follow(path, walls, driver.memory, strafes)
-        return as_kind(self._kind, actions), state
+        return as_kind(self._kind, actions, self._body), state
 
     def report(self, state: list[_Driver | None]) -> Report:
         """Returns where the robots are on the maps, and the numbers of decisions and tokens."""

@@ -12,7 +12,7 @@ from mazebench.agent import Agent, Inputs, Interface, Report
 
 from ..robot.driving import Drive
 from ..robot.facing import TurningDrive
-from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind
+from ..robot.moving_body import PLAYED, as_kind, has_all_six
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, range_sensor, report
 
@@ -40,7 +40,8 @@ class Navigator(Agent):
         """Acts in the environments of the interface, with their lidar if they have one."""
         self._senses, self._cell_size = self.senses_class(interface, "navigator"), interface.cell_size
         self._turns = interface.actions == "velocity" and self._senses.is_narrow
-        self._kind, self._strafes = interface.actions, interface.actions not in WITHOUT_STRAFING
+        self._kind, self._body = interface.actions, interface.body
+        self._strafes = has_all_six(self._kind, self._body)
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -78,7 +79,7 @@ class Navigator(Agent):
                     velocities[slot] = robot.turning.follow(path, walls, memory)
                 else:
                     actions[slot] = robot.drive.follow(path, walls, memory, self._strafes)
-        return velocities if self._turns else as_kind(self._kind, actions), state
+        return velocities if self._turns else as_kind(self._kind, actions, self._body), state
 
     def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns what it plans on, `[L, L]` float twice: the probability of a wall, and weights of the goal."""

@@ -12,7 +12,7 @@ from mazebench.tasks.context import GLOBAL_MAP
 
 from ..robot.cells import nearest_cell, start_cell
 from ..robot.dead_reckoning import DeadReckoning
-from ..robot.moving_body import PLAYED, WITHOUT_STRAFING, as_kind, observed_body
+from ..robot.moving_body import PLAYED, as_kind, has_all_six, observed_body
 from ..robot.pilot import Pilot
 from .planner import MapPlanner, plan
 
@@ -58,5 +58,5 @@ class ClosedLoopPlanner(MapPlanner):
                 is_wall = contexts[slot][GLOBAL_MAP][cell] > 0.5  # of the map that is shown
                 path = plan(contexts[slot], start if is_wall else cell)
                 drive.pilot = Pilot(path, size, self._cells_per_metre)
-            actions[slot] = drive.pilot.action(body, self._kind not in WITHOUT_STRAFING)
-        return as_kind(self._kind, actions), state
+            actions[slot] = drive.pilot.action(body, has_all_six(self._kind, self._body))
+        return as_kind(self._kind, actions, self._body), state

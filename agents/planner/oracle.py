@@ -12,9 +12,8 @@ import numpy as np
 from mazebench.agent import Agent, Inputs, Interface
 from mazebench.world.bodies import SLIDER, Body
 
-from ..robot.motion import moved
-from ..robot.moving_body import Point
-from ..robot.quickest import Course, make_course, quickest_drive
+from ..robot.any_body import Motions, motions_after, quickest
+from ..robot.quickest import Course, make_course
 
 _MAX_OFF = 0.1  # m from where the drive should be, before it is planned anew
 
@@ -26,8 +25,8 @@ class _Drive:
     goal: tuple[int, int]  # row, column
     course: Course
     actions: list[int] = dataclasses.field(default_factory=list)
-    velocity: Point = (0.0, 0.0)  # x, y (m/s); an episode begins at rest
-    points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins
+    motions: Motions = dataclasses.field(default_factory=Motions)  # an episode begins at rest
+    poses: list[tuple[float, float, float]] = dataclasses.field(default_factory=list)  # where each action begins
 
 
 class Oracle(Agent):
@@ -60,16 +59,14 @@ class Oracle(Agent):
             drive, goal = state[slot], tuple(truth.goal[slot].tolist())
             if drive is None or inputs.new_episode[slot] or goal != drive.goal:
                 # To a goal that follows another one, the drive goes on at the speed that it has.
-                velocity = (0.0, 0.0) if drive is None or inputs.new_episode[slot] else drive.velocity
+                motions = Motions() if drive is None or inputs.new_episode[slot] else drive.motions
                 course = make_course(self._body, truth.walls[slot], self._cell_size, goal)
-                drive = state[slot] = _Drive(goal, course, velocity=velocity)
-            if not drive.actions or math.dist(drive.points[0], (x, y)) > _MAX_OFF:
-                drive.actions, points = quickest_drive(drive.course, (x, y), drive.velocity, yaw)
-                drive.points = [(x, y), *points]
+                drive = state[slot] = _Drive(goal, course, motions=motions)
+            if not drive.actions or math.dist(drive.poses[0][:2], (x, y)) > _MAX_OFF:
+                drive.actions, poses = quickest(drive.course, (x, y), drive.motions, yaw)
+                drive.poses = [(x, y, yaw), *poses]
             actions[slot] = action = drive.actions.pop(0)
-            drive.points.pop(0)
+            drive.poses.pop(0)
             # Computed, and not observed: what is observed may be wrong.
-            motion, walls = drive.course.motion, drive.course.walls
-            *_, vx, vy = moved(motion, walls, self._cell_size, x, y, *drive.velocity, yaw, action)
-            drive.velocity = vx, vy
+            drive.motions = motions_after(drive.course, (x, y), drive.motions, yaw, action)
         return actions, state

@@ -15,6 +15,7 @@ from typing import Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
+from mazebench.errors import UnplayableError
 from mazebench.maps.maze import Cell, cell_to_point, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
 from mazebench.world.angles import wrap_angle
@@ -89,6 +90,13 @@ class _Plan:
 
 class Planner(MapPlanner):
     """Drives open loop between the cells of a path that is planned once a context."""
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns a planner, see `MapPlanner`; raises `UnplayableError` for a body whose turns are no whole looks."""
+        if not interface.body.strafes:
+            raise UnplayableError(f"agent 'planner': turns by whole looks, found the body {interface.body.name!r}")
+        return super().build(interface, seed=seed, checkpoint=checkpoint)
 
     def initial_state(self, batch_size: int) -> list[_Plan]:
         """Returns plans that `act` replaces where a context is new."""

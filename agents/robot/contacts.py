@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mazebench.maps.maze import Cell
 
-from .motion import Motion, moved_in_the_open
+from .any_body import step_in_the_open
 from .moving_body import MovingBody
 
 _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in the open, if a wall stopped it
@@ -25,8 +25,7 @@ def felt_walls(
     `before` and `after` are the body before and after the step, `cell_size` and the position's `deviation` are in m.
     `size` is L.
     """
-    vx, vy = (cell_size * speed for speed in before.velocity())
-    _, _, *free = moved_in_the_open(Motion.of(before.model), vx, vy, before.yaw, action)
+    free, _ = step_in_the_open(before, action, cell_size)
     column, level = int(after.x), int(after.y)
     off_middle = after.x - column - 0.5, after.y - level - 0.5
     off_before = before.x - column - 0.5, before.y - level - 0.5

@@ -11,22 +11,27 @@ import math
 
 import numpy as np
 
+from mazebench.constants import STEP_TIME
 from mazebench.maps.maze import Cell, cell_to_point
+from mazebench.world.angles import wrap_angle
 
+from .any_body import Motions, quickest, step_in_the_open
 from .moving_body import LOOK_LEFT, MovingBody, Point
 from .pilot import steer
-from .quickest import make_course, quickest_drive
+from .quickest import make_course
 from .senses import Memory
 
 _WAY_AHEAD = 7.0  # m of the path
 _STEPS_AHEAD = 7  # that are planned
 _STEPS_AHEAD_TURNING = 11  # if the body can't strafe: a quarter turn takes 4 or 5
 _STEPS_USED = 4  # of them
+_METRES_AHEAD, _FEWEST_AHEAD = 1.2, 12  # of a rolling body: the way and the steps that are planned, at least
 _WIDTH = 4  # of the beam, for each heading
 _INSIDE = 0.05  # share of a cell, from the edges of the one that the body is in
 _FASTEST = 1.1  # times the top speed; more is an error of the observation
 _BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
 _MOST_OFF = 0.08  # m from where the body should be, before the drive is planned anew
+_MOST_ASKEW = 0.15  # rad from the heading that a rolling body should have, likewise
 
 
 @dataclasses.dataclass
@@ -35,22 +40,27 @@ class Drive:
 
     actions: list[int] = dataclasses.field(default_factory=list)
     points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins, m
+    yaws: list[float] = dataclasses.field(default_factory=list)  # and with which heading, rad
     path: list[Cell] = dataclasses.field(default_factory=list)  # the cells ahead when it was planned
+    turn: float | None = None  # looks to the left in the last action; None for those that it is
 
     def follow(self, path: list[Cell], walls: np.ndarray, memory: Memory, strafes: bool) -> int:
         """Returns the next action along `path`, around likely `walls` `[L, L]` float; a turn where there is no path."""
         action, point = self.planned(path, walls, memory.body, memory.cell_size, strafes)
-        memory.command(action, point)
+        memory.command(action, point, turn=self.turn)
         return action
 
     def planned(
         self, path: list[Cell], walls: np.ndarray, body: MovingBody, cell_size: float, strafes: bool = True
     ) -> tuple[int, Point]:
         """Returns that action, and the point (x, y) that it should bring the body to."""
-        if len(path) == 1:
-            return steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), strafes), body.rest()
-        if not path:
-            return LOOK_LEFT, body.rest()
+        self.turn = None
+        if len(path) <= 1:
+            goal = tuple(cell_to_point(path[0], len(walls)).tolist()) if path else None
+            action = LOOK_LEFT if goal is None else steer(body, goal, strafes)
+            if not body.model.strafes:
+                self.turn = step_in_the_open(body, action, cell_size)[1] / body.model.turn_step
+            return action, body.rest()
         blocked = walls > _BLOCKED
         blocked[tuple(np.transpose(path))] = False
         return self.next(blocked, path, body, cell_size, strafes)
@@ -67,7 +77,8 @@ class Drive:
         x, y = body.x * cell_size, body.y * cell_size
         rest = self.path[self.path.index(ahead[0]) :] if ahead[0] in self.path else []
         continues = bool(rest) and ahead[: len(rest)] == rest[: len(ahead)]
-        if not continues or not self.actions or math.dist(self.points[0], (x, y)) > _MOST_OFF:
+        is_askew = not body.model.strafes and bool(self.yaws) and abs(wrap_angle(self.yaws[0] - body.yaw)) > _MOST_ASKEW
+        if not continues or not self.actions or is_askew or math.dist(self.points[0], (x, y)) > _MOST_OFF:
             # The part of the grid around the path, with walls around it.
             rows, columns = zip(*ahead, strict=True)
             top, left, size = min(rows) - 2, min(columns) - 2, len(blocked)
@@ -84,13 +95,20 @@ class Drive:
             fastest = _FASTEST * body.model.top_speed
             vx, vy = (min(max(speed * cell_size, -fastest), fastest) for speed in body.velocity())
             course = make_course(body.model, walls, cell_size, (last_row - top, last_column - left))
-            steps = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING
-            actions, points = quickest_drive(course, (x, y), (vx, vy), body.yaw, steps, _WIDTH, strafes)
-            self.actions, self.path = actions[:_STEPS_USED], ahead
+            steps, used = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING, _STEPS_USED
+            if not body.model.strafes:
+                steps = max(_FEWEST_AHEAD, math.ceil(_METRES_AHEAD / (body.model.top_speed * STEP_TIME)))
+                used = steps // 3
+            actions, poses = quickest(course, (x, y), Motions((vx, vy), body.turn), body.yaw, steps, _WIDTH, strafes)
+            self.actions, self.path = actions[:used], ahead
             shift_x, shift_y = corner_x * cell_size, corner_y * cell_size
-            self.points = [(body.x * cell_size, body.y * cell_size), *((shift_x + x, shift_y + y) for x, y in points)]
+            points = ((shift_x + x, shift_y + y) for x, y, _ in poses)
+            self.points = [(body.x * cell_size, body.y * cell_size), *points]
+            self.yaws = [body.yaw, *(yaw for _, _, yaw in poses)]
 
         before, after = self.points.pop(0), self.points[0]
+        yaw = self.yaws.pop(0)
+        self.turn = None if body.model.strafes else (self.yaws[0] - yaw) / body.model.turn_step
         point = body.x + (after[0] - before[0]) / cell_size, body.y + (after[1] - before[1]) / cell_size
         return self.actions.pop(0), point
 

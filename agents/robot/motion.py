@@ -1,4 +1,4 @@
-"""The body's motion: one agent step of the world's physics, without MuJoCo.
+"""The motion of a sliding body: one agent step of the world's physics, without MuJoCo.
 
 A drive pulls the body in one direction, against damping. Walls push it off by MuJoCo's soft contacts, without friction.
 A map is `[N, N]` bool here, indexed by x and y.
@@ -12,21 +12,22 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.constants import PHYSICS_TIMESTEP, STEPS_PER_ACTION
+from mazebench.errors import InputError
 from mazebench.kernels import compiled, inlined
-from mazebench.world.bodies import Body
+from mazebench.world.bodies import Body, SlidingBody
 from mazebench.world.bodies.body import CONTACT_SOLREF
 
-_NO_WALLS = np.zeros((3, 3), dtype=bool)
+NO_WALLS = np.zeros((3, 3), dtype=bool)
 BEARINGS = np.array([0.0, math.pi, math.pi / 2, -math.pi / 2])  # of the four drives, from the heading
 # Of a contact of 1 kg, computed from its time constant and its damping ratio as MuJoCo's documentation of solref has
 # it, for an impedance of 0.95.
 _IMPEDANCE = 0.95
-_CONTACT_DAMPING = 2 / (_IMPEDANCE * CONTACT_SOLREF[0])
-_CONTACT_STIFFNESS = (_CONTACT_DAMPING / (2 * CONTACT_SOLREF[1])) ** 2
+CONTACT_DAMPING = 2 / (_IMPEDANCE * CONTACT_SOLREF[0])
+CONTACT_STIFFNESS = (CONTACT_DAMPING / (2 * CONTACT_SOLREF[1])) ** 2
 
 
 class Motion(NamedTuple):
-    """The numbers of a body on which its motion depends, for kernels; see `Body`."""
+    """The numbers of a body on which its motion depends, for kernels; see `SlidingBody`."""
 
     mass: float  # kg
     damping: float  # N s/m
@@ -42,8 +43,10 @@ class Motion(NamedTuple):
 
     @classmethod
     def of(cls, body: Body) -> Motion:
-        """Returns that of a body."""
-        contact = body.reach, body.mass * _CONTACT_DAMPING, body.mass * _CONTACT_STIFFNESS
+        """Returns that of a body; raises `InputError` if it does not slide."""
+        if not isinstance(body, SlidingBody):
+            raise InputError(f"body {body.name!r}: expected a body that slides")
+        contact = body.reach, body.mass * CONTACT_DAMPING, body.mass * CONTACT_STIFFNESS
         drive = body.damping, body.drive_gain, body.drive_speed, body.drive_force
         return cls(body.mass, *drive, *contact, body.coasting_time, body.turn_step, body.top_speed)
 
@@ -107,7 +110,7 @@ def moved_in_the_open(
     motion: Motion, vx: float, vy: float, yaw: float, action: int
 ) -> tuple[float, float, float, float]:
     """Returns what `moved` does where no wall is near, with a position (m) since the action began."""
-    return moved(motion, _NO_WALLS, 1.0, 0.0, 0.0, vx, vy, yaw, action)
+    return moved(motion, NO_WALLS, 1.0, 0.0, 0.0, vx, vy, yaw, action)
 
 
 @inlined
@@ -130,7 +133,7 @@ def _after_physics_step(
     if force > motion.max_force:
         force, gain = motion.max_force, 0.0
     force_x, force_y = force * along_x - motion.damping * vx, force * along_y - motion.damping * vy
-    push_x, push_y = _push(motion, walls, cell_size, x, y, vx, vy, force_x, force_y)
+    push_x, push_y = push_of_walls(motion, walls, cell_size, x, y, vx, vy, force_x, force_y)
     # MuJoCo's integrator implicitfast takes the dampings of the next velocity, each axis by itself.
     damping_x, damping_y = motion.damping + gain * along_x**2, motion.damping + gain * along_y**2
     vx += PHYSICS_TIMESTEP * (force_x + push_x) / (motion.mass + PHYSICS_TIMESTEP * damping_x)
@@ -139,7 +142,7 @@ def _after_physics_step(
 
 
 @inlined
-def _push(
+def push_of_walls(
     motion: Motion,
     walls: np.ndarray,
     cell_size: float,

@@ -18,10 +18,12 @@ from mazebench.constants import (
     NUM_ACTIONS,
     VELOCITIES,
     YAW,
+    YAW_RATE,
     X,
     Y,
 )
 from mazebench.world.bodies import Body
+from mazebench.world.bodies.rolling import SHARES
 
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(NUM_ACTIONS)
 
@@ -40,9 +42,16 @@ _AS_KIND = {  # what each of the six is called in a kind that has it
 Point = tuple[float, float]  # x, y
 
 
-def as_kind(kind: str, actions: np.ndarray) -> np.ndarray:
-    """Returns actions `[B]` of the six as those of a kind: `[B]` int, or velocities `[B, 3]` or `[B, 2]`."""
+def as_kind(kind: str, actions: np.ndarray, body: Body) -> np.ndarray:
+    """Returns actions `[B]` of a body's six as those of a kind: `[B]` int, or velocities `[B, 3]` or `[B, 2]`."""
+    if kind == "diff" and not body.strafes:
+        return SHARES[actions]
     return _AS_KIND[kind][actions]
+
+
+def has_all_six(kind: str, body: Body) -> bool:
+    """Returns whether a kind has an action for each of a body's six: to strafe, or to drive an arc."""
+    return kind not in WITHOUT_STRAFING or (kind == "diff" and not body.strafes)
 
 
 class MovingBody(NamedTuple):
@@ -54,6 +63,7 @@ class MovingBody(NamedTuple):
     yaw: float  # rad
     forward: float  # cells a second
     left: float  # cells a second
+    turn: float = 0.0  # rad a second
 
     def velocity(self) -> Point:
         """Returns the velocity (x, y) on the map, in cells a second."""
@@ -67,11 +77,13 @@ class MovingBody(NamedTuple):
 
     def rest(self) -> Point:
         """Returns the point (x, y) at which the body comes to rest if it is let go now."""
-        (velocity_x, velocity_y), coasting_time = self.velocity(), self.model.coasting_time
-        return self.x + coasting_time * velocity_x, self.y + coasting_time * velocity_y
+        velocity_x, velocity_y = self.velocity()
+        speed = math.hypot(velocity_x, velocity_y)
+        rest_time = self.model.rest_time(speed)
+        return self.x + rest_time * velocity_x, self.y + rest_time * velocity_y
 
 
 def observed_body(model: Body, state: list[float], cells_per_metre: float) -> MovingBody:
     """Returns the body as a state `[12]` has it, whose x and y are taken for a place on the map."""
     x, y, forward, left = (cells_per_metre * state[index] for index in (X, Y, FORWARD_VELOCITY, LEFT_VELOCITY))
-    return MovingBody(model, x=x, y=y, yaw=state[YAW], forward=forward, left=left)
+    return MovingBody(model, x=x, y=y, yaw=state[YAW], forward=forward, left=left, turn=state[YAW_RATE])

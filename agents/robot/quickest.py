@@ -15,10 +15,11 @@ import numpy as np
 
 from mazebench.constants import NUM_ACTIONS, STEP_TIME
 from mazebench.kernels import compiled
-from mazebench.world.bodies import Body
+from mazebench.world.bodies import Body, RollingBody
 
 from .motion import BEARINGS, Motion, moved, moved_by_each
 from .moving_body import LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Point
+from .rolling import RollingMotion
 
 _NODES = 5  # a side of a cell
 _DETOUR = 3.0  # a metre of a way along which the body touches a wall counts as so many
@@ -45,7 +46,7 @@ _State = np.dtype(
 class Course(NamedTuple):
     """A maze, a goal in it, and the body that drives there."""
 
-    motion: Motion
+    motion: Any  # a `Motion`, or the `RollingMotion` of a rolling body
     walls: np.ndarray  # [N, N] bool
     cell_size: float  # m
     goal_x: int
@@ -60,8 +61,13 @@ def make_course(body: Body, walls: np.ndarray, cell_size: float, goal: tuple[int
     """
     by_x_and_y = np.ascontiguousarray(walls[::-1].T)
     by_x_and_y[[0, -1]] = by_x_and_y[:, [0, -1]] = True
-    x, y, motion = goal[1], len(walls) - 1 - goal[0], Motion.of(body)
-    return Course(motion, by_x_and_y, cell_size, x, y, _way_left(motion, by_x_and_y, cell_size, x, y))
+    x, y, reach = goal[1], len(walls) - 1 - goal[0], body.reach / (cell_size / _NODES)  # nodes
+    if isinstance(body, RollingBody):
+        # Rounded: a rolling body needs the middle of a way that is hardly wider than the body.
+        left = _way_left(round(reach), by_x_and_y, cell_size, x, y)
+        return Course(RollingMotion.of(body), by_x_and_y, cell_size, x, y, left)
+    left = _way_left(math.ceil(reach), by_x_and_y, cell_size, x, y)
+    return Course(Motion.of(body), by_x_and_y, cell_size, x, y, left)
 
 
 def quickest_drive(
@@ -88,7 +94,7 @@ def quickest_drive(
       strafes: whether the body can strafe.
     """
     turns = _TURNS if strafes else _TURNS_WITHOUT_STRAFING
-    way_left = _way_left_at(course, *point)
+    way_left = way_left_at(course, *point)
     expected = way_left / (course.motion.top_speed * STEP_TIME) if way_left < np.inf else 0.0
     beams = np.zeros(((num_steps or int(2 * expected) + 49) + 1, width * (2 * turns + 1)), _State)
     first = beams[0, 0]
@@ -186,9 +192,9 @@ def _drive(course: Course, state: Any, child: Any, after: np.ndarray) -> None:
     if int(x / course.cell_size) == course.goal_x and int(y / course.cell_size) == course.goal_y:
         child.score = child.driven + _ARRIVED
     else:
-        left = _way_left_at(course, x + course.motion.coasting_time * vx, y + course.motion.coasting_time * vy)
+        left = way_left_at(course, x + course.motion.coasting_time * vx, y + course.motion.coasting_time * vy)
         if left == np.inf:  # a wall would stop the body
-            left = _way_left_at(course, x, y)
+            left = way_left_at(course, x, y)
         child.score = left + _DRIVEN_WEIGHT * child.driven
 
 
@@ -215,10 +221,9 @@ def _keep_best(motion: Motion, children: Any, beam: Any, turns: int) -> int:
 
 
 @compiled
-def _way_left(motion: Motion, walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> np.ndarray:
-    """Returns `Course.way_left`."""
+def _way_left(reach: int, walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> np.ndarray:
+    """Returns `Course.way_left`, for a body that touches walls `reach` nodes from its centre."""
     spacing = cell_size / _NODES
-    reach = math.ceil(motion.reach / spacing)  # nodes, from the body's centre to where walls begin to push
     left = np.full((len(walls) * _NODES, len(walls) * _NODES), np.inf)
     is_done = np.zeros(left.shape, np.bool_)
     queue = [(0.0, goal_x * _NODES + i, goal_y * _NODES + j) for i in range(_NODES) for j in range(_NODES)]
@@ -252,7 +257,7 @@ def _way_left(motion: Motion, walls: np.ndarray, cell_size: float, goal_x: int, 
 
 
 @compiled
-def _way_left_at(course: Course, x: float, y: float) -> float:
+def way_left_at(course: Course, x: float, y: float) -> float:
     """Returns the way that is left from a point, between the nodes around it; infinite if they are all in walls."""
     x_in_nodes, y_in_nodes = x * _NODES / course.cell_size - 0.5, y * _NODES / course.cell_size - 0.5
     last = len(course.way_left) - 2

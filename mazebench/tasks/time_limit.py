@@ -24,7 +24,7 @@ def default_time_limit(num_cells: int, cell_size: float, body: Body, *, track: s
     """
     # The slider takes 2 steps for a metre at its top speed, and 4 for a quarter turn. A turn comes at each cell, on
     # tracks at every metre.
-    of_metre, of_turn = math.ceil(1 / (body.top_speed * STEP_TIME)), round(math.pi / 2 / body.turn_step)
+    of_metre, of_turn = math.ceil(1 / (body.top_speed * STEP_TIME)), body.quarter_turn_steps
     if track is not None:
         steps = math.ceil((of_metre + of_turn) * cell_size * num_cells)
         return steps + of_metre * (_LOST_SPARE if TRACKS[track].hides_pose else _SPARE)
