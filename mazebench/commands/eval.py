@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import os
 import pathlib
 import traceback
@@ -87,11 +88,12 @@ def evaluate(
     try:
         with stopping.stoppable(how_to_go_on, waits=True):
             with progress.evaluating(title, kept) as show:
+                summing = functools.partial(show, sums_up=True)
                 if suite is None:
-                    summaries = [run_evaluation(options, folder, run, show)]
+                    summaries = [run_evaluation(options, folder, run, show, summing=summing)]
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
-                    summaries = run_suite(suite, agents, folder, run, show, **chosen)
+                    summaries = run_suite(suite, agents, folder, run, show, summing, **chosen)
             if suite is None:
                 print_summary(summaries[0])
             else:

@@ -87,11 +87,12 @@ def run_evaluation(
     progress: Progress = lambda ended, of: None,
     agent_class: type[Agent] | None = None,
     task: Task | None = None,
+    summing: Progress = lambda ended, of: None,
 ) -> Summary:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
     `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
-    already.
+    already. `summing` is called as the oracle's drives end, which are measured after the last episode.
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
@@ -102,7 +103,7 @@ def run_evaluation(
             f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
         )
     with Pool(run.workers) as pool, tempfile.TemporaryDirectory() as temporary:
-        return run_plan(plan, out or pathlib.Path(temporary), pool, run, progress)
+        return run_plan(plan, out or pathlib.Path(temporary), pool, run, progress, summing)
 
 
 def run_plan(
@@ -111,6 +112,7 @@ def run_plan(
     pool: Pool,
     run: RunOptions,
     progress: Progress = lambda ended, of: None,
+    summing: Progress = lambda ended, of: None,
     *,
     suite: str | None = None,
     part: str | None = None,
@@ -129,7 +131,7 @@ def run_plan(
                 store.append(results)
                 progress(store.num_ended, num_trials)
             stopping.check()
-        records = with_oracle_steps(plan, store.records, run.num_envs)
+        records = with_oracle_steps(plan, store.records, run.num_envs, summing)
         summary = Summary(
             agent=plan.options.agent,
             task=plan.task.options,
