@@ -34,7 +34,7 @@ def evaluating(title: str, kept: Kept) -> Iterator[Callable[..., None]]:
 
         def advance(ended: int, of: int, sums_up: bool = False) -> None:
             if sums_up:
-                show(ended, of, f"summing up: the oracle drove {ended:,} of {of:,} ways")
+                show(ended, of, f"as a reference, the oracle drove {ended:,} of {of:,} ways")
                 return
             kept.ended, kept.of = ended, of
             show(ended, of, f"{ended:,} of {of:,} episodes")
