@@ -191,6 +191,15 @@ class TestRuns:
         assert all((each.maze.walls != house.walls).any() for each in check.older)
         assert [trial.episode.maze for trial in check.trials] == [0, 0, 1, 1, 2, 2, 3, 3]
 
+    def test_a_small_building_has_the_longer_half_of_its_distances(self, tmp_path):
+        for name in ("old", "new"):
+            write_ros_map(field(9), tmp_path / f"{name}.yaml")
+        paths = {name: str(tmp_path / f"{file}.yaml") for name, file in (("mazes", "new"), ("shown", "old"))}
+        check = plan_check(TaskOptions(**paths, cell_size=1.0), None, 12)
+        assert {trial.distance for trial in check.trials} == set(range(7, 13))
+        check = plan_check(TaskOptions(**paths, cell_size=1.0, distances=(3,)), None, 12)
+        assert {trial.distance for trial in check.trials} == {3}
+
     @pytest.mark.parametrize(
         ("words", "said"),
         [

@@ -28,6 +28,7 @@ from mazebench.tasks.arena import arena_of
 from mazebench.tasks.streams import BUILDING, REBUILT
 from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.tracks import DISTANCES
 from mazebench.tasks.trials import Trial, spread_trials
 
 SUITE = "check-map"
@@ -114,7 +115,13 @@ def plan_check(options: TaskOptions, strength: int | None, num_trips: int, seed:
     mazes = tuple(each.maze for each in older)
     of_right = TaskOptions(task=BUILDING, mazes=mazes, split="eval", distances=options.distances, body=options.body)
     of_old = of_right.replace(shown=tuple(format_walls(each.walls) for each in older))
-    right, old = resolve(of_right), resolve(of_old, arena=arena_of(of_old, mazes, older))
+    arena = arena_of(of_old, mazes, older)
+    farthest = int(min(map(arena.farthest, range(len(mazes)))) * arena.cell_size)  # m
+    if options.distances is None and farthest < DISTANCES[0]:  # a small building: the longer half of its distances
+        of_right, of_old = (
+            each.replace(distances=range(farthest // 2 + 1, farthest + 1)) for each in (of_right, of_old)
+        )
+    right, old = resolve(of_right), resolve(of_old, arena=arena)
     tasks = {OLD: old, RIGHT: right, NONE: old.replace(hide=("map",))}
     return MapCheck(tasks, tuple(spread_trials(old, num_trips, seed)), older)
 

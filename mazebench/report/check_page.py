@@ -30,7 +30,8 @@ from mazebench.storage.json_files import write_json
 INDEX, NUMBERS, SPOTS = "index.html", "check.json", "trouble.csv"
 _NAMES = {OLD: "old map", RIGHT: "right map", NONE: "no map"}
 _COLORS = {OLD: "#d55e00", RIGHT: "#0072b2", NONE: "#4d4d4d"}
-_MOST_SPOTS, _MOST_WAYS = 8, 5  # on the page; ways of the worst trips in a building
+_LEAST = 0.5  # m that a trip, or a spot in all, loses at least on the page
+_MOST_SPOTS, _MOST_WAYS = 8, 5  # ways of the worst trips in a building
 _WALL, _SPOT = (118, 122, 130), "#9b1c86"
 
 
@@ -47,12 +48,17 @@ class Checked(NamedTuple):
     @property
     def worst(self) -> list[Spot]:
         """The spots at which metres are lost, as many as the page has."""
-        return [spot for spot in self.spots if spot.metres > 0][:_MOST_SPOTS]
+        return [spot for spot in self.spots if spot.metres >= _LEAST][:_MOST_SPOTS]
 
     @property
     def elsewhere(self) -> float:
         """The metres that are not lost at these spots; less than 0 where other trips are shorter with the old map."""
         return float(self.lost.sum()) - sum(spot.metres for spot in self.worst)
+
+    @property
+    def has_several(self) -> bool:
+        """True if the trips are in several buildings."""
+        return len({record.maze for record in self.results[OLD].records}) > 1
 
     def describe(self, spot: Spot) -> str:
         """Returns a spot in words."""
@@ -64,8 +70,7 @@ class Checked(NamedTuple):
 
     def label(self, spot: Spot) -> str:
         """Returns the point of a spot, after the name of the building if there are several."""
-        several = len({record.maze for record in self.results[OLD].records}) > 1
-        return f"{spot.maze} " * several + f"({spot.point[0]:.1f}, {spot.point[1]:.1f})"
+        return f"{spot.maze} " * self.has_several + f"({spot.point[0]:.1f}, {spot.point[1]:.1f})"
 
 
 def read_checks(out: pathlib.Path, older: Sequence[OlderMap], top_speed: float) -> list[Checked]:
@@ -124,9 +129,8 @@ def _page(checks: Sequence[Checked], shown: Sequence[dict[str, ReportedResult]],
         number = results.index(own[OLD])
         links = [f"#episode={number}-{spot.trips[0]}-{place}" for place, spot in enumerate(check.worst)]
         opens = opens or next(iter(links), "")
-        rows = zip(check.worst, map(check.label, check.worst), links, strict=True)
         images = {name: as_svg(figure) for name, figure in figures[check.agent].items()}
-        sections.append({"check": check, "rows": list(rows), "figures": images})
+        sections.append({"check": check, "rows": list(zip(check.worst, links, strict=True)), "figures": images})
     agents, mazes = ", ".join(check.agent for check in checks), ", ".join(shown[0][OLD].episodes.maze.unique())
     subtitle = f"{agents}: {checks[0].answer.num_trips} trips in {mazes}"
     return with_explorer("check.html", results, provenance_of(results), opens, subtitle=subtitle, sections=sections)
@@ -193,7 +197,8 @@ def _draw_building(check: Checked, older: OlderMap, ways: dict[str, Any]) -> Fig
     axes.set(xlim=(left, right), ylim=(bottom, top))  # which imshow moves
 
     records = check.results[OLD].records
-    own = [number for number in np.argsort(-check.lost).tolist() if records[number].maze == maze.name]
+    worst = [number for number in np.argsort(-check.lost).tolist() if check.lost[number] >= _LEAST]
+    own = [number for number in worst if records[number].maze == maze.name]
     for number in own[:_MOST_WAYS]:
         for part, dashes in ((RIGHT, (0, (4, 2))), (OLD, "-")):
             if ways[part]:

@@ -288,7 +288,8 @@ function drawDriven(current, ranges, color) {
 
 function describe() {
   const { current } = view;
-  byId("shown-caption").textContent = current.shown ? "The map that the agent was shown" : "The map that the agent was shown was not recorded";
+  const shown = data.results[view.result].hidden ? "The map, which was hidden from the agent" : "The map that the agent was shown";
+  byId("shown-caption").textContent = current.shown ? shown : "The map that the agent was shown was not recorded";
   byId("driven-caption").textContent = !current.path.x.length
     ? "The maze; the path was not recorded (eval --record)"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";

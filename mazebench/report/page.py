@@ -133,6 +133,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
                 "picture": 0 if not maps or maps[0].are_cells else len(maps[0].walls),  # pixels a side, if no cells
                 "lidar": task.options.lidar.max_range if task and "lidar" in task.options.sensors else 0,  # m
                 "groups": result.facts,
+                "hidden": "map" in result.summary.task.hide,
             }
         )
     # The explorer opens with a result that has paths, hierarchical if there is such a one.
