@@ -196,7 +196,7 @@ class TestRuns:
             write_ros_map(field(9), tmp_path / f"{name}.yaml")
         paths = {name: str(tmp_path / f"{file}.yaml") for name, file in (("mazes", "new"), ("shown", "old"))}
         check = plan_check(TaskOptions(**paths, cell_size=1.0), None, 12)
-        assert {trial.distance for trial in check.trials} == set(range(7, 13))
+        assert {trial.distance for trial in check.trials} == set(range(6, 11))
         check = plan_check(TaskOptions(**paths, cell_size=1.0, distances=(3,)), None, 12)
         assert {trial.distance for trial in check.trials} == {3}
 

@@ -24,7 +24,7 @@ from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.real_buildings import is_real, load_building
 from mazebench.maps.text import format_walls
 from mazebench.results.map_costs import NONE, OLD, RIGHT
-from mazebench.tasks.arena import arena_of
+from mazebench.tasks.arena import Arena, arena_of
 from mazebench.tasks.streams import BUILDING, REBUILT
 from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.task_options import TaskOptions
@@ -32,6 +32,7 @@ from mazebench.tasks.tracks import DISTANCES
 from mazebench.tasks.trials import Trial, spread_trials
 
 SUITE = "check-map"
+_FARTHEST_SHARE = 0.9  # of the largest distance in a building; few cells are farther apart
 _DETOURS = {OLD: 1.2, RIGHT: 1.0, NONE: 1.6}  # steps of a trip by those with the right map, to tell the time
 
 
@@ -113,17 +114,23 @@ def plan_check(options: TaskOptions, strength: int | None, num_trips: int, seed:
         raise InputError(f"expected an old map (--shown) or a strength of made changes (--changed), found {found}")
     older = _changed_buildings(options, strength) if strength else arena_of(options.replace(task=BUILDING)).shown or ()
     mazes = tuple(each.maze for each in older)
-    of_right = TaskOptions(task=BUILDING, mazes=mazes, split="eval", distances=options.distances, body=options.body)
+    of_right = TaskOptions(task=BUILDING, mazes=mazes, split="eval", body=options.body)
     of_old = of_right.replace(shown=tuple(format_walls(each.walls) for each in older))
     arena = arena_of(of_old, mazes, older)
-    farthest = int(min(map(arena.farthest, range(len(mazes)))) * arena.cell_size)  # m
-    if options.distances is None and farthest < DISTANCES[0]:  # a small building: the longer half of its distances
-        of_right, of_old = (
-            each.replace(distances=range(farthest // 2 + 1, farthest + 1)) for each in (of_right, of_old)
-        )
-    right, old = resolve(of_right), resolve(of_old, arena=arena)
+    distances = options.distances or _distances(arena)
+    right, old = (
+        resolve(of_right.replace(distances=distances)),
+        resolve(of_old.replace(distances=distances), arena=arena),
+    )
     tasks = {OLD: old, RIGHT: right, NONE: old.replace(hide=("map",))}
     return MapCheck(tasks, tuple(spread_trials(old, num_trips, seed)), older)
+
+
+def _distances(arena: Arena) -> tuple[int, ...]:
+    """Returns the distances of trips in m: those of a track, or in a small building the longer half of what it has."""
+    farthest = min(map(arena.farthest, range(len(arena.mazes)))) * arena.cell_size
+    most = max(1, int(_FARTHEST_SHARE * farthest))
+    return tuple(each for each in DISTANCES if each <= most) or tuple(range(most // 2 + 1, most + 1))
 
 
 def _changed_buildings(options: TaskOptions, strength: int) -> tuple[OlderMap, ...]:
