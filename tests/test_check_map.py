@@ -182,6 +182,13 @@ class TestRuns:
             assert (tmp_path / "check" / name).read_bytes() == (folder / name).read_bytes()
         assert again.splitlines()[1:-1] == said.splitlines()[1:-1]
 
+    def test_resume_with_other_trips_is_refused(self, checked, command):
+        folder, arguments, _ = checked
+        for other in (("--trips", str(TRIPS - 1)), ("--seed", "1")):
+            status, _, errors = command(*arguments, "--resume", *other)
+            assert status == 2
+            assert f"{folder}: holds another run" in errors.replace("/navigator/old-map", "")
+
     def test_changed_buildings_have_the_frame_of_their_plan(self, tmp_path):
         house = Maze(generate("hospital", 41, np.random.default_rng(7)).walls, "plan")
         write_ros_map(house, tmp_path / "plan.yaml", ORIGIN)

@@ -11,7 +11,7 @@ from simple_mazes import field
 
 from mazebench.maps.maze import Maze, path_through_walls
 from mazebench.maps.older_map import OlderMap
-from mazebench.results.trouble import CLOSED, OPENED, find_spots, shortest_way
+from mazebench.results.trouble import CLOSED, DETOUR, OPENED, find_spots, shortest_way
 
 
 def two_rooms(*doors: int) -> np.ndarray:
@@ -22,10 +22,10 @@ def two_rooms(*doors: int) -> np.ndarray:
     return walls
 
 
-def spots_of(shown, built, trips, lost, **place):
+def spots_of(shown, built, trips, lost, drives=None, **place):
     older = OlderMap(shown, Maze(built, "rooms", cell_size=place.pop("cell_size", 1.0)), **place)
     records = [make_record(i, maze="rooms", size=21, start=s, goal=g) for i, (s, g) in enumerate(trips)]
-    return find_spots(records, np.array(lost), [older])
+    return find_spots(records, np.array(lost), [older], drives or [(np.zeros((1, 2)),) * 2] * len(trips))
 
 
 LEFT, RIGHT = (5, 5), (5, 15)
@@ -33,7 +33,7 @@ LEFT, RIGHT = (5, 5), (5, 15)
 
 def test_a_closed_door_is_named_with_its_trips():
     trips = [(LEFT, RIGHT), (RIGHT, LEFT), ((1, 1), (9, 9)), ((5, 2), (5, 18))]
-    [spot] = spots_of(two_rooms(5, 19), two_rooms(19), trips, [20.0, 24.0, 0.5, 21.0])
+    [spot] = spots_of(two_rooms(5, 19), two_rooms(19), trips, [20.0, 24.0, 0.4, 21.0])
     assert spot.kind == CLOSED
     assert spot.cell == (5, 10)
     assert spot.point == (10.5, 15.5)  # of 21 m: row 5 from above
@@ -59,6 +59,16 @@ def test_of_several_walls_that_with_the_longest_way_around_counts():
     assert spot.cell == (5, 10)
 
 
+def test_without_such_walls_a_trip_counts_where_it_leaves_the_right_way():
+    line = np.column_stack([np.linspace(2.5, 8.5, 25), np.full(25, 15.5)])
+    aside = line.copy()
+    aside[6:18, 1] += [1, 2, 3, 3, 2, 1, 4, 5, 5, 4, 3, 1]  # twice, farther away the second time
+    trips = [((5, 2), (5, 8))] * 2
+    [spot] = spots_of(two_rooms(5), two_rooms(5), trips, [9.0, 0.1], [(aside, line), (line, line)])
+    assert (spot.kind, spot.trips, spot.metres) == (DETOUR, (0,), 9.0)
+    assert spot.cell == (4, 5)  # of the 12th point, (5.25, 16.5)
+
+
 def test_places_within_a_metre_are_one_and_the_worst_comes_first():
     shown, built = two_rooms(3, 5, 16, 19), two_rooms(19)
     trips = [((3, 9), (3, 11)), ((5, 9), (5, 11)), ((16, 9), (16, 11))]
@@ -68,7 +78,7 @@ def test_places_within_a_metre_are_one_and_the_worst_comes_first():
 
 
 def test_a_map_that_is_right_has_no_trouble():
-    assert spots_of(two_rooms(5), two_rooms(5), [(LEFT, RIGHT)], [3.0]) == []
+    assert spots_of(two_rooms(5), two_rooms(5), [(LEFT, RIGHT)], [0.3]) == []
 
 
 def test_the_way_is_that_of_the_records_fact():

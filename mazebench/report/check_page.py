@@ -23,14 +23,14 @@ from mazebench.report.page import as_svg, with_explorer
 from mazebench.report.write_report import FIGURES, provenance_of
 from mazebench.results.map_costs import NONE, OLD, RIGHT, Answer, Cost, answer, driven
 from mazebench.results.reading import Result, load_result, read_suite
-from mazebench.results.trouble import CLOSED, Spot, find_spots
+from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
+from mazebench.results.trouble import CLOSED, DETOUR, LEAST, OPENED, Spot, find_spots
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import write_json
 
 INDEX, NUMBERS, SPOTS = "index.html", "check.json", "trouble.csv"
 _NAMES = {OLD: "old map", RIGHT: "right map", NONE: "no map"}
 _COLORS = {OLD: "#d55e00", RIGHT: "#0072b2", NONE: "#4d4d4d"}
-_LEAST = 0.5  # m that a trip, or a spot in all, loses at least on the page
 _MOST_SPOTS, _MOST_WAYS = 8, 5  # ways of the worst trips in a building
 _WALL, _SPOT = (118, 122, 130), "#9b1c86"
 
@@ -48,7 +48,7 @@ class Checked(NamedTuple):
     @property
     def worst(self) -> list[Spot]:
         """The spots at which metres are lost, as many as the page has."""
-        return [spot for spot in self.spots if spot.metres >= _LEAST][:_MOST_SPOTS]
+        return [spot for spot in self.spots if spot.metres >= LEAST][:_MOST_SPOTS]
 
     @property
     def elsewhere(self) -> float:
@@ -63,10 +63,14 @@ class Checked(NamedTuple):
     def describe(self, spot: Spot) -> str:
         """Returns a spot in words."""
         place = f"{self.label(spot)} m"
-        now = "closed on the map's way" if spot.kind == CLOSED else "open now, a wall on the map, on the way"
+        now = {
+            CLOSED: "closed on the map's way of",
+            OPENED: "open now, a wall on the map, on the way of",
+            DETOUR: "the right way is left in",
+        }
         num = len(spot.trips)
         each = f"{spot.metres:.1f} m" if num == 1 else f"{spot.metres / num:.1f} m each"
-        return f"{place}: {now} of {num} of {len(self.lost)} trips, {each}"
+        return f"{place}: {now[spot.kind]} {num} of {len(self.lost)} trips, {each}"
 
     def label(self, spot: Spot) -> str:
         """Returns the point of a spot, after the name of the building if there are several."""
@@ -80,9 +84,11 @@ def read_checks(out: pathlib.Path, older: Sequence[OlderMap], top_speed: float) 
         parts = [part for part in suite.parts if (out / folder / part).exists()]
         results = {part: load_result(out / folder / part) for part in parts}
         old, right = results[OLD].records, results[RIGHT].records
+        paths = (load_trajectories(out / folder / part / TRAJECTORIES) for part in (OLD, RIGHT))
+        drives = [(mine.pose[:, :2], its.pose[:, :2]) for mine, its in zip(*paths, strict=True)]
         found = answer(old, right, results[NONE].records if NONE in results else None, top_speed)
         lost = (driven(old, top_speed) - driven(right, top_speed))[:, 0]
-        checks.append(Checked(agent, top_speed, results, found, lost, find_spots(old, lost, older)))
+        checks.append(Checked(agent, top_speed, results, found, lost, find_spots(old, lost, older, drives)))
     return checks
 
 
@@ -197,7 +203,7 @@ def _draw_building(check: Checked, older: OlderMap, ways: dict[str, Any]) -> Fig
     axes.set(xlim=(left, right), ylim=(bottom, top))  # which imshow moves
 
     records = check.results[OLD].records
-    worst = [number for number in np.argsort(-check.lost).tolist() if check.lost[number] >= _LEAST]
+    worst = [number for number in np.argsort(-check.lost).tolist() if check.lost[number] >= LEAST]
     own = [number for number in worst if records[number].maze == maze.name]
     for number in own[:_MOST_WAYS]:
         for part, dashes in ((RIGHT, (0, (4, 2))), (OLD, "-")):

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy
+import scipy.ndimage
+import scipy.spatial
 
 from mazebench.maps.maze import Cell
 from mazebench.maps.older_map import OlderMap
@@ -18,8 +19,10 @@ from mazebench.maps.readers.occupancy_grid import points_from
 from mazebench.maps.search import search
 from mazebench.results.records import Record
 
-CLOSED, OPENED = "closed", "open"  # what a place is now: a wall on the way of the map, or free where the map has a wall
-_NEAR = 1.0  # m; places that are no farther apart are one
+# What a place is now: a wall on the way of the map, free where the map has a wall, or where trips leave the right way.
+CLOSED, OPENED, DETOUR = "closed", "open", "detour"
+LEAST = 0.5  # m that a trip loses, from which on a place is looked for
+_NEAR = 1.0  # m; places that are no farther apart are one, and so are ways
 _STEPS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # up, left, down, right, as `path_through_walls` prefers them
 
 
@@ -29,7 +32,7 @@ class Spot(NamedTuple):
     maze: str
     point: tuple[float, float]  # x, y (m) in the frame of the old map
     cell: tuple[float, float]  # row and column in the maze, in the middle of the places of its trips
-    kind: str  # CLOSED or OPENED
+    kind: str  # CLOSED, OPENED or DETOUR
     trips: tuple[int, ...]  # numbers of the trips whose way leads through it, the one that loses most first
     metres: float  # that they lose together
 
@@ -39,26 +42,39 @@ class _Place(NamedTuple):
 
     cell: Cell  # of these walls, the middle one on the way
     kind: str
-    detour: float  # cells, by which the way around is longer
+    around: float = math.inf  # cells, by which the way around is longer
 
 
-def find_spots(records: Sequence[Record], lost: np.ndarray, older: Sequence[OlderMap]) -> list[Spot]:
+def find_spots(
+    records: Sequence[Record],
+    lost: np.ndarray,
+    older: Sequence[OlderMap],
+    drives: Sequence[tuple[np.ndarray, np.ndarray]],
+) -> list[Spot]:
     """Returns the trouble spots of trips, the one with the most metres first.
 
     A trip loses its metres at one place: of all walls on the shortest way of the old map, and of all walls of the old
-    map on the shortest way of the building, at those which take the longest way around.
+    map on the shortest way of the building, at those which take the longest way around. If none takes a metre, it is
+    where the trip leaves the way that it takes with the right map, before it is farthest from it.
 
     Args:
       records: of the trips with the old map.
       lost: `[E]` m, more than with the right map.
       older: the old map of each maze.
+      drives: of each trip, the points (x, y) that were driven in the maze with the old map and with the right one:
+        `[L, 2]` m.
     """
     places: dict[str, dict[int, _Place]] = {}  # by maze and number of the trip
     maps = {each.maze.name: each for each in older}
     for number, record in enumerate(records):
+        maze = maps[record.maze].maze
         found = _places(maps[record.maze], record.start, record.goal)
-        if found:
-            places.setdefault(record.maze, {})[number] = max(found, key=lambda place: place.detour)
+        place = max(found, key=lambda each: each.around, default=None)
+        if lost[number] >= LEAST and (place is None or place.around * maze.cell_size < _NEAR):
+            row, column = maze.cell(_parting(*drives[number])).tolist()
+            place = _Place((row, column), DETOUR)
+        if place is not None:
+            places.setdefault(record.maze, {})[number] = place
     spots = [spot for maze, own in places.items() for spot in _joined(maps[maze], own, lost)]
     return sorted(spots, key=lambda spot: -spot.metres)
 
@@ -76,10 +92,17 @@ def _joined(older: OlderMap, places: dict[int, _Place], lost: np.ndarray) -> lis
         row, column = np.mean([places[each].cell for each in own], axis=0).tolist()
         x, y = points_from(older.origin, *maze.point(np.array([row, column])).tolist())
         kinds = [places[each].kind for each in own]
-        kind = max((CLOSED, OPENED), key=kinds.count)
+        kind = max((CLOSED, OPENED, DETOUR), key=kinds.count)
         metres = float(lost[own].sum())
         spots.append(Spot(maze.name, (float(x), float(y)), (row, column), kind, tuple(own), metres))
     return spots
+
+
+def _parting(driven: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Returns the last point (x, y) of a drive that is near another one, before the point that is farthest from it."""
+    gaps, _ = scipy.spatial.cKDTree(right).query(driven)
+    near = np.flatnonzero(gaps[: gaps.argmax() + 1] <= _NEAR)  # both begin in one place
+    return np.asarray(driven[near[-1]])
 
 
 def _places(older: OlderMap, start: Cell, goal: Cell) -> list[_Place]:
