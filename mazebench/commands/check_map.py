@@ -51,11 +51,12 @@ def check_map(
         raise InputError(f"the page needs {error.name}, which the extra [report] installs (docs/start.md)") from error
     from mazebench.evaluation.checked_agent import AgentError
     from mazebench.evaluation.map_check import plan_check
+    from mazebench.kernels import num_cores
 
     names = agents or ["navigator"]
     asked, chosen = TaskOptions(**options_in(values, TaskOptions)), options_in(values, EvalOptions)
     check = plan_check(asked, strength, num_trips, chosen.get("seed", 0))
-    workers = check.num_workers(names, **chosen) if workers is None else workers
+    workers = num_cores() if workers is None else workers
     run = RunOptions(**options_in(values, RunOptions), record=True, workers=workers)
     if not check.is_finished(names, out):
         seconds = check.seconds(names, workers, **chosen)

@@ -14,10 +14,9 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress
 from mazebench.evaluation.measured_oracle import measure_steps_of_legs
-from mazebench.evaluation.plan import Plan, build_agent, config_of, make_plan
+from mazebench.evaluation.plan import build_agent, make_plan
 from mazebench.evaluation.store import is_finished
 from mazebench.evaluation.suites import Part, folders_of, run_suite
-from mazebench.kernels import num_cores
 from mazebench.maps.maze_files import read_located
 from mazebench.maps.older_map import OlderMap
 from mazebench.maps.readers.occupancy_grid import LocatedMaze
@@ -49,20 +48,10 @@ class MapCheck:
         """The top speed of the body, in m/s."""
         return self.tasks[RIGHT].body.top_speed
 
-    def num_workers(self, agents: Sequence[str], **options: Any) -> int:
-        """Returns the cores, as many processes as fill them; 0 if the config of an agent rules processes out."""
-        plans = (self._plan(agent, **options) for agent in agents)
-        configs = [config_of(plan.options, plan.agent_class) for plan in plans]
-        return 0 if any(config and config.needs_one_process for config in configs) else num_cores()
-
     def is_finished(self, agents: Sequence[str], out: pathlib.Path) -> bool:
         """Returns whether all trips of the agents are driven."""
         folders = folders_of(agents).values()
         return all(is_finished(out / folder / part, record=True) for folder in folders for part in self.tasks)
-
-    def _plan(self, agent: str, **options: Any) -> Plan:
-        task = self.tasks[RIGHT]
-        return make_plan(EvalOptions(agent=agent, task=task.options, **options), trials=self.trials, task=task)
 
     def run(
         self,
@@ -83,9 +72,9 @@ class MapCheck:
 
     def seconds(self, agents: Sequence[str], workers: int, **options: Any) -> float:
         """Returns about how long `run` takes: by one trip of each agent with the right map, after a short one."""
-        ordered, total = sorted(self.trials, key=lambda trial: trial.shortest_path), 0.0
+        ordered, task, total = sorted(self.trials, key=lambda trial: trial.shortest_path), self.tasks[RIGHT], 0.0
         for agent in agents:
-            plan = self._plan(agent, **options)
+            plan = make_plan(EvalOptions(agent=agent, task=task.options, **options), trials=self.trials, task=task)
             for trial in (ordered[0], ordered[len(ordered) // 2]):
                 built = build_agent(plan.options, plan.task, plan.agent_class)
                 began = time.perf_counter()
@@ -118,10 +107,8 @@ def plan_check(options: TaskOptions, strength: int | None, num_trips: int, seed:
     of_old = of_right.replace(shown=tuple(format_walls(each.walls) for each in older))
     arena = arena_of(of_old, mazes, older)
     distances = options.distances or _distances(arena)
-    right, old = (
-        resolve(of_right.replace(distances=distances)),
-        resolve(of_old.replace(distances=distances), arena=arena),
-    )
+    right = resolve(of_right.replace(distances=distances))
+    old = resolve(of_old.replace(distances=distances), arena=arena)
     tasks = {OLD: old, RIGHT: right, NONE: old.replace(hide=("map",))}
     return MapCheck(tasks, tuple(spread_trials(old, num_trips, seed)), older)
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+import scipy.ndimage
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
@@ -21,7 +22,7 @@ from mazebench.report.episodes import ReportedResult, reported
 from mazebench.report.figures import STYLE, WIDTH, save
 from mazebench.report.page import as_svg, with_explorer
 from mazebench.report.write_report import FIGURES, provenance_of
-from mazebench.results.map_costs import NONE, OLD, RIGHT, Answer, Cost, answer, driven
+from mazebench.results.map_costs import NONE, OLD, RIGHT, Answer, answer, driven
 from mazebench.results.reading import Result, load_result, read_suite
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.results.trouble import CLOSED, DETOUR, LEAST, OPENED, Spot, find_spots
@@ -30,7 +31,12 @@ from mazebench.storage.json_files import write_json
 
 INDEX, NUMBERS, SPOTS = "index.html", "check.json", "trouble.csv"
 _NAMES = {OLD: "old map", RIGHT: "right map", NONE: "no map"}
-_COLORS = {OLD: "#d55e00", RIGHT: "#0072b2", NONE: "#4d4d4d"}
+_COLORS = {OLD: "#d55e00", RIGHT: "#0072b2"}
+_NOW = {
+    CLOSED: "closed on the map's way of",
+    OPENED: "open now, a wall on the map, on the way of",
+    DETOUR: "the right way is left in",
+}
 _MOST_SPOTS, _MOST_WAYS = 8, 5  # ways of the worst trips in a building
 _WALL, _SPOT = (118, 122, 130), "#9b1c86"
 
@@ -39,7 +45,6 @@ class Checked(NamedTuple):
     """The check of one agent."""
 
     agent: str
-    top_speed: float  # m/s, of the body
     results: dict[str, Result]  # by part
     answer: Answer
     lost: np.ndarray  # [E] m, with the old map more than with the right one
@@ -62,15 +67,9 @@ class Checked(NamedTuple):
 
     def describe(self, spot: Spot) -> str:
         """Returns a spot in words."""
-        place = f"{self.label(spot)} m"
-        now = {
-            CLOSED: "closed on the map's way of",
-            OPENED: "open now, a wall on the map, on the way of",
-            DETOUR: "the right way is left in",
-        }
         num = len(spot.trips)
-        each = f"{spot.metres:.1f} m" if num == 1 else f"{spot.metres / num:.1f} m each"
-        return f"{place}: {now[spot.kind]} {num} of {len(self.lost)} trips, {each}"
+        each = f"{spot.metres / num:.1f} m{' each' * (num > 1)}"
+        return f"{self.label(spot)} m: {_NOW[spot.kind]} {num} of {len(self.lost)} trips, {each}"
 
     def label(self, spot: Spot) -> str:
         """Returns the point of a spot, after the name of the building if there are several."""
@@ -88,7 +87,7 @@ def read_checks(out: pathlib.Path, older: Sequence[OlderMap], top_speed: float) 
         drives = [(mine.pose[:, :2], its.pose[:, :2]) for mine, its in zip(*paths, strict=True)]
         found = answer(old, right, results[NONE].records if NONE in results else None, top_speed)
         lost = (driven(old, top_speed) - driven(right, top_speed))[:, 0]
-        checks.append(Checked(agent, top_speed, results, found, lost, find_spots(old, lost, older, drives)))
+        checks.append(Checked(agent, results, found, lost, find_spots(old, lost, older, drives)))
     return checks
 
 
@@ -101,8 +100,7 @@ def write_check(out: pathlib.Path, checks: Sequence[Checked], older: Sequence[Ol
         name = results[OLD].folder.parent.name
         played = {record.maze for record in check.results[OLD].records}
         buildings = {each.maze.name: each for each in older if each.maze.name in played}
-        drawn = {f"{name}-{maze}": _draw_building(check, each, ways) for maze, each in buildings.items()}
-        figures[check.agent] = drawn | {f"{name}-trips": _draw_trips(check)}
+        figures[check.agent] = {f"{name}-{maze}": _draw_building(check, each, ways) for maze, each in buildings.items()}
     make_folder(out / FIGURES)
     with writing_to(out):
         for name, figure in (item for own in figures.values() for item in own.items()):
@@ -156,26 +154,8 @@ def _to_csv(checks: Sequence[Checked]) -> str:
 
 def _to_json(check: Checked) -> dict[str, Any]:
     found = check.answer
-
-    def cost(each: Cost) -> dict[str, Any]:
-        return {
-            "metres_more": each.metres.value,
-            "metres_more_ci95": [each.metres.low, each.metres.high],
-            "seconds_more": each.seconds.value,
-            "seconds_more_ci95": [each.seconds.low, each.seconds.high],
-            "metres_more_of_one_in_ten": each.tenth,
-            "arrived": each.num_arrived,
-        }
-
-    return {
-        "answer": found.sentence,
-        "verdict": found.verdict,
-        "trips": found.num_trips,
-        RIGHT: {"metres": found.metres, "arrived": found.num_arrived},
-        OLD: cost(found.old),
-        NONE: None if found.none is None else cost(found.none),
-        "places": [spot._asdict() for spot in check.spots],
-    }
+    places = [spot._asdict() for spot in check.spots]
+    return {"answer": found.sentence, "verdict": found.verdict, **dataclasses.asdict(found), "places": places}
 
 
 @mpl.rc_context(STYLE)
@@ -185,14 +165,15 @@ def _draw_building(check: Checked, older: OlderMap, ways: dict[str, Any]) -> Fig
     pair = older.pair or pair_of_walls(older.walls, maze.walls, maze.cell_size)
     image = np.full((*maze.walls.shape, 4), 255, dtype=np.uint8)
     image[older.walls] = (*_WALL, 255)
-    image[maze.walls & older.walls & ~_near(~(maze.walls & older.walls))] = 0  # what only fills up the square
+    is_free = ~(maze.walls & older.walls)  # on one of them
+    image[~scipy.ndimage.binary_dilation(is_free, np.ones((3, 3)))] = 0  # what only fills up the square
     for name in ("wall_now", "free_now"):
         image[getattr(pair, name)] = (*OF_PAIR[name], 255)
 
     # All in metres of the old map's frame, in which the maze may be turned.
     x, y, yaw = older.origin
     place = Affine2D().rotate(yaw).translate(x, y)
-    free = place.transform(maze.point(np.argwhere(~(maze.walls & older.walls))))
+    free = place.transform(maze.point(np.argwhere(is_free)))
     (left, bottom), (right, top) = free.min(axis=0) - 1, free.max(axis=0) + 1
     height = float(np.clip(WIDTH * (top - bottom) / (right - left), 2.0, 9.0))
     figure = Figure(figsize=(WIDTH, height + 0.9), layout="constrained")
@@ -234,25 +215,3 @@ def _explain(axes: Axes, figure: Figure) -> None:
     axes.plot([], [], color=_COLORS[OLD], label="worst trips, old map")
     axes.plot([], [], color=_COLORS[RIGHT], linestyle=(0, (4, 2)), label="the same, right map")
     figure.legend(loc="outside lower center", ncols=3)
-
-
-@mpl.rc_context(STYLE)
-def _draw_trips(check: Checked) -> Figure:
-    """Returns the metres of all trips more than with the right map, in order."""
-    figure = Figure(figsize=(WIDTH, 2.4), layout="constrained")
-    axes = figure.add_subplot(xlabel="trips, in order (%)", ylabel="m more than with\nthe right map")
-    for part in (NONE, OLD):
-        if part in check.results:
-            metres, right = (driven(check.results[each].records, check.top_speed)[:, 0] for each in (part, RIGHT))
-            shares = 100 * (np.arange(len(right)) + 0.5) / len(right)
-            axes.plot(shares, np.sort(metres - right), color=_COLORS[part], label=_NAMES[part], drawstyle="steps-mid")
-    axes.axhline(0, color=_COLORS[RIGHT], linewidth=0.8)
-    axes.legend(loc="upper left")
-    return figure
-
-
-def _near(cells: np.ndarray) -> np.ndarray:
-    """Returns some cells (`[N, N]` bool) and those that touch them."""
-    padded = np.pad(cells, 1)
-    size = len(cells)
-    return np.logical_or.reduce([padded[i : i + size, j : j + size] for i in range(3) for j in range(3)])
