@@ -69,7 +69,7 @@ OBSERVED = 6  # seed of the episode
 SEEN = 4  # likewise of the places in all looks
 STRIDE = 0.15  # m, of a drawn shortest path
 EXPLORED = 28  # the episode in the explorer
-CHECKED = "raw-industriestrasse-2013-since-2012-07"  # the real building whose old map is checked
+CHECKED = "pal-office-7th-floor-changed-1"  # the real building whose old map is checked
 FILMED = 94  # the episode: the navigator finds a door closed and drives around
 VIEWS = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
 SIDE, GAP, TITLE, LEGEND = 256, 12, 32, 70  # pixels; three views and four gaps are 816 wide
@@ -393,7 +393,7 @@ def draw_check() -> None:
         command = (sys.executable, "-m", "mazebench", "check-map", *maps, "--out", name)
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         hidden = "nav, .skip, #explorer, #results, .note, .figure:last-child {display: none} main {max-width: 900px}"
-        _take(pathlib.Path(name) / "index.html", "check-map", hidden, "900,1000")
+        _take(pathlib.Path(name) / "index.html", "check-map", hidden, "900,1120")
 
 
 def _take(page: pathlib.Path, name: str, style: str, size: str, address: str = "") -> None:

@@ -77,6 +77,13 @@ def test_places_within_a_metre_are_one_and_the_worst_comes_first():
     assert (far.trips, far.cell, far.metres) == ((2,), (16, 10), 30.0)
 
 
+def test_a_wide_passage_is_one_place():
+    doors = range(8, 11)
+    trips = [((7, 9), (7, 11)), ((11, 9), (11, 11))]  # through its upper and through its lower side
+    [spot] = spots_of(two_rooms(*doors, 19), two_rooms(19), trips, [20.0, 30.0])
+    assert (spot.trips, spot.cell) == ((1, 0), (9, 10))
+
+
 def test_a_map_that_is_right_has_no_trouble():
     assert spots_of(two_rooms(5), two_rooms(5), [(LEFT, RIGHT)], [0.3]) == []
 

@@ -35,7 +35,7 @@ _COLORS = {OLD: "#d55e00", RIGHT: "#0072b2"}
 _NOW = {
     CLOSED: "closed on the map's way of",
     OPENED: "open now, a wall on the map, on the way of",
-    DETOUR: "the right way is left in",
+    DETOUR: "a detour begins on",
 }
 _MOST_SPOTS, _MOST_WAYS = 8, 5  # ways of the worst trips in a building
 _WALL, _SPOT = (118, 122, 130), "#9b1c86"

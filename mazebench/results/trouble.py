@@ -23,6 +23,7 @@ from mazebench.results.records import Record
 CLOSED, OPENED, DETOUR = "closed", "open", "detour"
 LEAST = 0.5  # m that a trip loses, from which on a place is looked for
 _NEAR = 1.0  # m; places that are no farther apart are one, and so are ways
+_SMALL = 3.0  # m, the longer side of a change that is one place, such as a closed passage
 _STEPS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # up, left, down, right, as `path_through_walls` prefers them
 
 
@@ -80,10 +81,16 @@ def find_spots(
 
 
 def _joined(older: OlderMap, places: dict[int, _Place], lost: np.ndarray) -> list[Spot]:
-    """Returns the spots of the trips of one maze: places that are near each other are one."""
+    """Returns the spots of the trips of one maze: places that are near each other, or in one small change, are one."""
     maze, marked = older.maze, np.zeros(older.walls.shape, dtype=bool)
+    changes, _ = scipy.ndimage.label(older.walls != maze.walls, np.ones((3, 3)))
+    boxes = scipy.ndimage.find_objects(changes)
     for place in places.values():
         marked[place.cell] = True
+        if change := changes[place.cell]:
+            rows, columns = boxes[change - 1]
+            if max(rows.stop - rows.start, columns.stop - columns.start) * maze.cell_size <= _SMALL:
+                marked[rows, columns] |= changes[rows, columns] == change
     reach = max(1, round(_NEAR / 2 / maze.cell_size))
     areas, num_areas = scipy.ndimage.label(scipy.ndimage.binary_dilation(marked, np.ones((3, 3)), reach))
     spots = []
