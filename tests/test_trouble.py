@@ -78,10 +78,10 @@ def test_places_within_a_metre_are_one_and_the_worst_comes_first():
 
 
 def test_a_wide_passage_is_one_place():
-    doors = range(8, 11)
-    trips = [((7, 9), (7, 11)), ((11, 9), (11, 11))]  # through its upper and through its lower side
-    [spot] = spots_of(two_rooms(*doors, 19), two_rooms(19), trips, [20.0, 30.0])
-    assert (spot.trips, spot.cell) == ((1, 0), (9, 10))
+    doors = range(8, 14)
+    trips = [((7, 9), (7, 11)), ((14, 9), (14, 11))]  # through its upper and through its lower side
+    [spot] = spots_of(two_rooms(*doors, 19), two_rooms(19), trips, [20.0, 30.0], cell_size=0.5)
+    assert (spot.trips, spot.cell) == ((1, 0), (10.5, 10))
 
 
 def test_a_map_that_is_right_has_no_trouble():
