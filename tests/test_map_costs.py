@@ -7,7 +7,7 @@ import pytest
 from made_results import make_record
 
 from mazebench.results.intervals import Estimate, difference_interval
-from mazebench.results.map_costs import ANEW, KEEP, OPEN, REDRAW, TOO_FEW, Answer, Cost, answer
+from mazebench.results.map_costs import ANEW, KEEP, NO_VERDICT, OPEN, REDRAW, TOO_FEW, Answer, Cost, answer
 
 SPEED = 2.0  # m/s
 
@@ -100,6 +100,10 @@ class TestVerdict:
     )
     def test_it_follows_the_bounds_of_the_interval(self, low, high, said):
         assert Answer(48, 20.0, 48, estimated(low, 0.0, high), estimated(3, 5, 7)).verdict == said
+
+    def test_a_robot_that_does_not_arrive_with_the_right_map_gets_none(self):
+        assert Answer(50, 20.0, 45, estimated(5, 7, 9), None).verdict == ANEW
+        assert Answer(50, 20.0, 44, estimated(5, 7, 9), None).verdict == NO_VERDICT
 
     def test_where_no_map_costs_little_the_building_is_open(self):
         little = estimated(-0.3, 0.1, 0.9)

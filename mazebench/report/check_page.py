@@ -23,7 +23,7 @@ from mazebench.report.figures import STYLE, WIDTH, save
 from mazebench.report.page import as_svg, with_explorer
 from mazebench.report.write_report import FIGURES, provenance_of
 from mazebench.results.map_costs import NONE, OLD, RIGHT, Answer, answer, driven
-from mazebench.results.reading import Result, load_result, read_suite
+from mazebench.results.reading import SUMMARY, Result, load_result, read_suite
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.results.trouble import CLOSED, DETOUR, LEAST, OPENED, Spot, find_spots
 from mazebench.storage.files import make_folder, open_whole, writing_to
@@ -77,10 +77,12 @@ class Checked(NamedTuple):
 
 
 def read_checks(out: pathlib.Path, older: Sequence[OlderMap], top_speed: float) -> list[Checked]:
-    """Returns the checks in a folder, of each agent one; `top_speed` is that of the body, in m/s."""
+    """Returns the checks in a folder, of each agent that is done one; `top_speed` is that of the body, in m/s."""
     suite, checks = read_suite(out), []
     for agent, folder in suite.folders.items():
-        parts = [part for part in suite.parts if (out / folder / part).exists()]
+        parts = [part for part in suite.parts if (out / folder / part / SUMMARY).exists()]
+        if not {OLD, RIGHT} <= set(parts):
+            continue
         results = {part: load_result(out / folder / part) for part in parts}
         old, right = results[OLD].records, results[RIGHT].records
         paths = (load_trajectories(out / folder / part / TRAJECTORIES) for part in (OLD, RIGHT))

@@ -22,6 +22,7 @@ LITTLE, MUCH = 0.05, 0.25
 KEEP, REDRAW, ANEW = "keep it", "keep it, but redraw these places", "draw it anew"
 OPEN = "this building is so open that an old map costs nothing"
 TOO_FEW = "too few trips"
+LEAST_ARRIVED, NO_VERDICT = 0.9, "none, as this robot misses its goals with the right map, too"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +50,8 @@ class Answer:
         """What to do with the map, by the bounds of the metres' intervals; see docs/your_map.md."""
         little, much = LITTLE * self.metres, MUCH * self.metres
         low, high = self.old.metres.low, self.old.metres.high
+        if self.num_arrived < LEAST_ARRIVED * self.num_trips:
+            return NO_VERDICT
         if high < little:
             is_open = self.none is not None and self.none.metres.high < little
             return OPEN if is_open else KEEP
