@@ -11,6 +11,7 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -33,7 +34,7 @@ from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells, path_through_walls
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
-from mazebench.maps.real_buildings import PREFIX, RIGHT, YEARS, buildings, load_building, load_older
+from mazebench.maps.real_buildings import PREFIX, RIGHT, YEARS, building_of, buildings, load_building, load_older
 from mazebench.report.page import lay_on_first_pose
 from mazebench.report.write_report import write_report
 from mazebench.results.played import Shown, shown_of
@@ -68,6 +69,7 @@ OBSERVED = 6  # seed of the episode
 SEEN = 4  # likewise of the places in all looks
 STRIDE = 0.15  # m, of a drawn shortest path
 EXPLORED = 28  # the episode in the explorer
+CHECKED = "pal-office-7th-floor-changed-1"  # the real building whose old map is checked
 FILMED = 94  # the episode: the navigator finds a door closed and drives around
 VIEWS = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
 SIDE, GAP, TITLE, LEGEND = 256, 12, 32, 70  # pixels; three views and four gaps are 816 wide
@@ -374,24 +376,37 @@ def _path_of_disc(maze: Maze, radius: float, start: Cell, goal: Cell) -> tuple[n
 
 def draw_explorer() -> None:
     """Takes a picture of the report's explorer, at an episode in which a closed door is driven around."""
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        print("report-explorer.png: expected Chromium, found none; the picture stays as it is")
-        return
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         options = {"task": "rebuilt", "level": 2, "split": "dev", "episodes_per_maze": 1}
         mazebench.evaluate("navigator", out=folder / "navigator", record=True, **options)
         write_report([folder / "navigator"], folder / "report")
         # The explorer alone: what is around it is hidden.
-        page = (folder / "report" / "report.html").read_text(encoding="utf-8")
-        hidden = "<style>header, .skip, .notice, #figures, #results {display: none}</style>"
-        page = re.sub("<meta http-equiv[^>]*>", hidden, page)
-        (folder / "page.html").write_text(page, encoding="utf-8")
-        look = ("--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=20000")
-        size, target = "--window-size=1100,690", f"--screenshot={FOLDER / 'report-explorer.png'}"
-        address = (folder / "page.html").as_uri() + f"#episode=0-{EXPLORED}"
-        subprocess.run([browser, *look, size, target, address], check=True, capture_output=True)
+        hidden = "header, .skip, .notice, #figures, #results {display: none}"
+        _take(folder / "report" / "report.html", "report-explorer", hidden, "1100,690", f"#episode=0-{EXPLORED}")
+
+
+def draw_check() -> None:
+    """Takes a picture of the page of a check of an old map, without the explorer."""
+    with tempfile.TemporaryDirectory() as name:
+        maps = ("--mazes", f"{PREFIX}{CHECKED}", "--shown", f"{PREFIX}{building_of(CHECKED).older}")
+        command = (sys.executable, "-m", "mazebench", "check-map", *maps, "--out", name)
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        hidden = "nav, .skip, #explorer, #results, .note, .figure:last-child {display: none} main {max-width: 900px}"
+        _take(pathlib.Path(name) / "index.html", "check-map", hidden, "900,1120")
+
+
+def _take(page: pathlib.Path, name: str, style: str, size: str, address: str = "") -> None:
+    """Takes a picture of a page to which a style is added, in a window of a size."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        print(f"{name}.png: expected Chromium, found none; the picture stays as it is")
+        return
+    text = re.sub("<meta http-equiv[^>]*>", f"<style>{style}</style>", page.read_text(encoding="utf-8"))
+    page.write_text(text, encoding="utf-8")
+    look = ("--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=20000", f"--window-size={size}")
+    target = f"--screenshot={FOLDER / f'{name}.png'}"
+    subprocess.run([browser, *look, target, page.as_uri() + address], check=True, capture_output=True)
 
 
 def _shown_map(shown: Shown) -> np.ndarray:
@@ -435,5 +450,5 @@ def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **lo
 
 if __name__ == "__main__":
     of_episodes = film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes
-    for draw in (*of_episodes, draw_real_buildings, draw_looks, draw_shortest_paths, draw_explorer):
+    for draw in (*of_episodes, draw_real_buildings, draw_looks, draw_shortest_paths, draw_explorer, draw_check):
         draw()

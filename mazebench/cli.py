@@ -15,6 +15,7 @@ import typer
 
 from mazebench import __version__, stopping
 from mazebench.commands.bench import bench
+from mazebench.commands.check_map import check_map
 from mazebench.commands.collect import collect
 from mazebench.commands.compare import compare
 from mazebench.commands.eval import evaluate
@@ -43,6 +44,7 @@ app = typer.Typer(
 app.command(short_help="Make mazes: MJCF, text, picture, mesh.")(generate)
 app.command("eval", short_help="Evaluate agents on unseen mazes.")(evaluate)
 app.command(short_help="Make one run of its shares.")(merge)
+app.command("check-map", short_help="Tell what an old map costs a robot, and where.")(check_map)
 app.command(short_help="Compare two agents on the same episodes.")(compare)
 app.command(short_help="Collect demonstrations of an agent.")(collect)
 app.command(short_help="Train an agent on the training mazes.")(train)

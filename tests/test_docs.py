@@ -57,7 +57,7 @@ def test_commands_are_those_of_the_command_line(page):
                     assert all(f"\n{target}:" in (ROOT / "Makefile").read_text() for target in words)
                 elif region.lexemes["language"] == "sh" and program == "python":
                     assert importlib.util.find_spec(words[1]) if words[0] == "-m" else (ROOT / words[0]).exists()
-    for name, words in re.findall(r"`mazebench ([a-z]+)([^`]*)`", document.text):
+    for name, words in re.findall(r"`mazebench ([a-z][a-z-]*)([^`]*)`", document.text):
         options = {option for each in COMMANDS[name].params for option in each.opts + each.secondary_opts}
         assert set(re.findall(r"--[\w-]+", words)) <= options, words
 

@@ -17,6 +17,7 @@ from mazebench.errors import InputError
 from mazebench.maps.align import align, fit, moved
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
+from mazebench.maps.maze_files import read_located
 from mazebench.maps.pair import compared, draw_pair, pair_of_walls
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, states_in_cells
 from mazebench.results.reading import load_result
@@ -161,6 +162,17 @@ class TestPairsOfFiles:
         assert summary["pairs"]["new"]["wall_now"] < 2
         assert cv2.imread(str(tmp_path / "run" / "pair.png")) is not None
         assert load_result(tmp_path / "run").summary.pairs["new"].covered > 0.95
+
+    def test_the_maze_has_its_place_in_the_frame_of_the_older_map(self, tmp_path):
+        new = self.write(tmp_path, "new", scan(origin=(1.0, 2.0, 0.0)))
+        pose = 12.0, -9.0, 0.7
+        old = self.write(tmp_path, "old", redrawn(scan(origin=(1.0, 2.0, 0.0)), pose))
+        options = {"mazes": new, "cell_size": 0.5, "distances": 5}
+        [aligned] = Task.of("building", **options, shown=old, align=True).arena.shown
+        [alike] = Task.of("building", **options, shown=new).arena.shown
+        assert alike.origin == read_located(new, cell_size=0.5).origin
+        back = moved(dataclasses.replace(scan(), origin=aligned.origin), pose).origin
+        assert back == pytest.approx(alike.origin, abs=0.05)
 
     def test_an_origin_that_is_five_centimetres_off_changes_nothing(self, tmp_path, remarks):
         new = self.write(tmp_path, "new", scan())

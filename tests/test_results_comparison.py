@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import re
+
 import numpy as np
 import pytest
-from made_results import PROVENANCE, edit_task, make_record, make_result
+from made_results import PROVENANCE, edit_records, edit_task, make_record, make_result
 
 from mazebench.errors import InputError
 from mazebench.results.comparison import Comparison, compare_folders, compare_results, to_json
@@ -124,3 +127,51 @@ class TestResults:
             title = compare_folders(tmp_path / "shown", tmp_path / name).title
             assert title.startswith("A is navigator (track adrift, level 1) in ")
             assert f"B is {who} (track adrift, level 1) in {tmp_path / name}; " in title
+
+
+class TestPrinted:
+    """What `mazebench compare` prints."""
+
+    def written(self, folder, agent="navigator", level=1, blocked=lambda record: record["episode"] % 4 == 0, **changes):
+        make_result(folder, agent, task="rebuilt", num_mazes=12, record=False, skill=0.9, level=level)
+        edit_records(folder, lambda record: record | {"blocked": blocked(record)})
+        return edit_task(folder, **changes) if changes else folder
+
+    def rows(self, output):
+        lines = output.splitlines()
+        first = next(number for number, line in enumerate(lines) if set(line) == {"─"})
+        return [line.split("  ")[0].split(" 0.")[0].split(" 1.")[0].strip() for line in lines[first + 1 :]]
+
+    def test_the_total_comes_first_then_blocked_then_bins_with_enough_episodes(self, command, tmp_path):
+        a, b = self.written(tmp_path / "a"), self.written(tmp_path / "b", "random")
+        status, output, _ = command("compare", a, b)
+        assert status == 0
+        total, *others = self.rows(output)
+        assert (total, others[:2]) == ("all", ["blocked", "not blocked"])
+        records = [json.loads(line) for line in (a / "episodes.jsonl").read_text().splitlines()]
+        reached = 14
+        for name in others[2:]:
+            low, high = re.fullmatch(r"(\d+)-(\d+) m", name).groups()
+            assert int(low) > reached
+            reached = int(high)
+            assert sum(int(low) <= record["distance"] <= reached for record in records) >= 20
+        assert reached == max(record["distance"] for record in records)
+        assert "map worth" not in output
+
+    def test_few_episodes_are_not_split_by_distance(self, tmp_path):
+        records = [record(index, "a", 2 + index, True, 0.8) for index in range(39)]
+        found = compare_results(result(tmp_path, records), result(tmp_path, records))
+        assert found.by_bin == {}
+        assert len(found.by_distance) == 39
+
+    def test_distances_with_enough_episodes_have_rows_of_their_own(self, tmp_path):
+        records = [record(index, "a", 2 + index // 25, True, 0.8) for index in range(60)]
+        found = compare_results(result(tmp_path, records), result(tmp_path, records))
+        assert {name: row.num_episodes for name, row in found.by_bin.items()} == {"2 cells": 25, "3-4 cells": 35}
+
+    def test_a_map_worth_is_named(self, command, tmp_path):
+        shown, hidden = self.written(tmp_path / "a"), self.written(tmp_path / "b", hide=["map"])
+        for folders, sign in (((shown, hidden), "A - B"), ((hidden, shown), "B - A")):
+            assert f"{sign}, on time: the map worth of navigator\n" in command("compare", *folders)[1]
+        without_goal = self.written(tmp_path / "c", hide=["map", "goal"])
+        assert "map worth" not in command("compare", shown, without_goal)[1]

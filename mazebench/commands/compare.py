@@ -37,8 +37,10 @@ def compare(
         print(json.dumps(comparison.to_json(found), indent=1))
         return
     if "" in found.parts:
-        rows = found.parts[""].by_distance if found.has_distances else {}
-        named = {str(distance): row for distance, row in rows.items()}
-        summary_table.print_comparison(found.title, "distance", {**named, "all": found.parts[""].overall})
+        part = found.parts[""]
+        bins = part.by_bin if found.has_distances else {}
+        summary_table.print_comparison(found.title, "episodes", {"all": part.overall, **part.by_fact, **bins})
     else:
         summary_table.print_comparison(found.title, "part", {name: part.overall for name, part in found.parts.items()})
+    if found.worth:
+        print(found.worth)

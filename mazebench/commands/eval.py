@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import os
 import pathlib
 import traceback
@@ -99,12 +100,13 @@ def evaluate(
     try:
         with stopping.stoppable(how_to_go_on, waits=True):
             with progress.evaluating(title, kept) as show:
+                summing = functools.partial(show, sums_up=True)
                 if suite is None:
-                    summary = run_evaluation(options, folder, run, show, shard=share)
+                    summary = run_evaluation(options, folder, run, show, summing=summing, shard=share)
                     summaries = [summary] if summary else []
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
-                    summaries = run_suite(suite, agents, folder, run, show, shard=share, **chosen)
+                    summaries = run_suite(suite, agents, folder, run, show, summing, shard=share, **chosen)
             if shard is not None:
                 end_shard(folder, share)
             elif suite is None:

@@ -28,11 +28,14 @@ class Kept:
 
 
 @contextmanager
-def evaluating(title: str, kept: Kept) -> Iterator[Callable[[int, int], None]]:
-    """Yields a function (ended, of) that updates `kept` and shows it."""
+def evaluating(title: str, kept: Kept) -> Iterator[Callable[..., None]]:
+    """Yields a function (ended, of) that updates `kept` and shows it, or with `sums_up` the oracle's drives."""
     with _showing(title, stderr=True) as show:
 
-        def advance(ended: int, of: int) -> None:
+        def advance(ended: int, of: int, sums_up: bool = False) -> None:
+            if sums_up:
+                show(ended, of, f"as a reference, the oracle drove {ended:,} of {of:,} ways")
+                return
             kept.ended, kept.of = ended, of
             show(ended, of, f"{ended:,} of {of:,} episodes")
 
@@ -77,7 +80,7 @@ def _showing(title: str, *, stderr: bool) -> Iterator[Callable[[float, float, ob
             bar.update(task.id, completed=done, total=of)
             if console.is_terminal:
                 bar.update(task.id, description=str(status))
-            elif (now := bar.get_time()) >= next_line or (title and done == of):
+            elif (now := bar.get_time()) >= next_line or (title and done in (0, of)):
                 next_line = now + _SECONDS_BETWEEN_LINES
                 left = (
                     "" if task.time_remaining is None else f" {datetime.timedelta(seconds=task.time_remaining)} left;"

@@ -100,11 +100,13 @@ def run_evaluation(
     task: Task | None = None,
     executor: concurrent.futures.Executor | None = None,
     shard: Shard = WHOLE,
+    summing: Progress = lambda ended, of: None,
 ) -> Summary | None:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
     `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
-    already. Of a `shard` without episodes, None is returned.
+    already. Of a `shard` without episodes, None is returned. `summing` is called as the oracle's drives end, which are
+    measured after the last episode.
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
@@ -117,7 +119,7 @@ def run_evaluation(
     episodes = shard.numbers(plan.trials)
     with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
         job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
-        summaries = run_jobs([job], 1, len(episodes), pool, run, progress)
+        summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None
 
 
@@ -143,7 +145,13 @@ class _Running(NamedTuple):
 
 
 def run_jobs(
-    jobs: Iterable[Job], num_jobs: int, num_episodes: int, pool: Pool, run: RunOptions, progress: Progress
+    jobs: Iterable[Job],
+    num_jobs: int,
+    num_episodes: int,
+    pool: Pool,
+    run: RunOptions,
+    progress: Progress,
+    summing: Progress,
 ) -> list[Summary]:
     """Runs what is left of some evaluations and returns their summaries in order; a finished one is not run again.
 
@@ -162,7 +170,7 @@ def run_jobs(
         if index in running and not running[index].left:
             job, store, _, closing = running.pop(index)
             with closing:
-                summaries[index] = _finish(job, store, run.num_envs)
+                summaries[index] = _finish(job, store, run.num_envs, summing)
 
     def work(opened: contextlib.ExitStack) -> Iterator[tuple[int, Plan, Chunk]]:
         for index, job in enumerate(jobs):
@@ -196,9 +204,9 @@ def run_jobs(
     return [summaries[index] for index in sorted(summaries)]
 
 
-def _finish(job: Job, store: Store, num_envs: int) -> Summary:
+def _finish(job: Job, store: Store, num_envs: int, summing: Progress) -> Summary:
     """Writes the results of an evaluation of which all episodes have ended, and returns the summary."""
-    plan, records = job.plan, with_oracle_steps(job.plan, store.records, num_envs)
+    plan, records = job.plan, with_oracle_steps(job.plan, store.records, num_envs, summing)
     summary = Summary(
         agent=plan.options.agent,
         task=plan.task.options,

@@ -203,6 +203,7 @@ def make_plan(
     if ":" in options.agent:  # modules that it imports when it is built are part of its code
         with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
             build_agent(options, task, agent_class)
+    given = {"episodes_sha256": _episodes_hash(trials)} if trials else {}
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed, options.episodes_per_maze)
     origin = provenance(options, task, agent_class)
@@ -216,6 +217,7 @@ def make_plan(
         **({} if task.options.shown is None else {"shown": _own_or_real(task.options.shown)}),
         "episodes_per_distance": options.episodes_per_distance,
         **({"episodes_per_maze": options.episodes_per_maze} if is_part else {}),
+        **given,
         **({} if config is None else {"config": config.identity()}),
         "seed": options.seed,
         **{name: getattr(origin, name) for name in _IDENTIFYING},
@@ -225,6 +227,11 @@ def make_plan(
     if options.checkpoint is not None:  # agents may change the working folder
         options = dataclasses.replace(options, checkpoint=str(pathlib.Path(options.checkpoint).absolute()))
     return Plan(options, task, agent_class, trials, identity, provenance=origin)
+
+
+def _episodes_hash(trials: Sequence[Trial]) -> str:
+    episodes = [dataclasses.astuple(trial.episode) for trial in trials]
+    return hashlib.sha256(repr(episodes).encode("ascii")).hexdigest()
 
 
 def _own_or_real(mazes: Any) -> str | None:

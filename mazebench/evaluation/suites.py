@@ -26,8 +26,10 @@ from mazebench.results.suite_groups import OF, WITH_RIGHT_MAP, WITHOUT_MAP, grou
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT
+from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.trials import Trial
 from mazebench.world.looks import VARIED
 
 _DEFAULT_RUN = RunOptions()
@@ -43,6 +45,9 @@ class Part:
     task: TaskOptions
     episodes_per_distance: int | None = None  # as in `EvalOptions`, likewise the other one
     episodes_per_maze: int | None = None
+    # What is played, if that is there already: the task with these options, and the episodes.
+    played: Task | None = None
+    trials: tuple[Trial, ...] | None = None
 
 
 def _hierarchical(name: str, **options: Any) -> Part:
@@ -149,28 +154,32 @@ def run_suite(
     out: pathlib.Path,
     run: RunOptions = _DEFAULT_RUN,
     progress: Progress = lambda ended, of: None,
+    summing: Progress = lambda ended, of: None,
     *,
     checkpoint: str | None = None,
     seed: int = 0,
     overrides: Mapping[str, str] | None = None,
     executor: concurrent.futures.Executor | None = None,
     shard: Shard = WHOLE,
+    own_parts: Sequence[Part] | None = None,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
     Parts that an agent can't play are left out; a `mazebench.errors.Remark` warns of it.
 
     Args:
-      suite: a name in `SUITES`.
+      suite: a name in `SUITES`, or that of `own_parts`.
       agents: whom to evaluate.
       out: the suite's folder; with `run.resume`, agents that it does not have yet are added.
       run: how. `run.record` None writes trajectories, but does not run finished parts again that have none.
       progress: called as episodes end, with their number and that of all parts together.
+      summing: called as the oracle's drives end, which are measured after the last episode of a part.
       checkpoint: of a single agent.
       seed: of what the agents draw.
       overrides: values of the config of a single agent.
       executor: runs the episodes, as in `mazebench.evaluation.evaluate.evaluate`.
       shard: whose episodes alone are run, with the summaries of the evaluations in which it has some.
+      own_parts: the parts, instead of those in `SUITES`.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -178,12 +187,12 @@ def run_suite(
       UnplayableError: if an agent can play no part.
       RunError: if an agent or a worker failed; what ended until then is kept.
     """
-    if suite not in SUITES:
+    if own_parts is None and suite not in SUITES:
         raise unknown("suite", suite, SUITES)
     out = out.absolute()  # agents may change the working folder
     if (checkpoint is not None or overrides) and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint or --set, found {len(agents)}")
-    parts = {part.name: part for part in SUITES[suite]}
+    parts = {part.name: part for part in own_parts or SUITES[suite]}
 
     def planned(agent: str, part: Part) -> Plan:
         plan = make_plan(
@@ -195,13 +204,15 @@ def run_suite(
                 checkpoint=checkpoint,
                 seed=seed,
                 overrides=overrides or {},
-            )
+            ),
+            trials=part.trials,
+            task=part.played,
         )
         plan.check_spread(run.workers, machines=(run.cluster, executor, shard) != (None, None, WHOLE))
         return plan
 
     # Plans in real buildings are made when they are played, but for the first of a group, which stands for the others.
-    agent_of = {folder: agent for agent, folder in _folders(agents).items()}
+    agent_of = {folder: agent for agent, folder in folders_of(agents).items()}
     firsts = {name: next(each for each in parts if group_of(each) == group_of(name)) for name in parts}
     plans = {
         (folder, name): planned(agent, part)
@@ -229,9 +240,11 @@ def run_suite(
 
     with pool_of(run, executor) as pool:
         make_folder(out)
-        _prepare(out, suite, agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume)
+        _prepare(
+            out, suite, tuple(parts), agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume
+        )
         how = dataclasses.replace(run, resume=True)
-        return run_jobs(jobs(), len(chosen), sum(map(len, episodes.values())), pool, how, progress)
+        return run_jobs(jobs(), len(chosen), sum(map(len, episodes.values())), pool, how, progress, summing)
 
 
 def _unplayable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> set[tuple[str, str]]:
@@ -263,7 +276,13 @@ def _unplayable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: st
 
 
 def _prepare(
-    out: pathlib.Path, suite: str, agents: Sequence[str], seed: int, plans: dict[tuple[str, str], Plan], resume: bool
+    out: pathlib.Path,
+    suite: str,
+    parts: tuple[str, ...],
+    agents: Sequence[str],
+    seed: int,
+    plans: dict[tuple[str, str], Plan],
+    resume: bool,
 ) -> None:
     """Makes `out` ready to hold the suite, or refuses before anything is run."""
     found = sorted(path.name for path in out.iterdir() if path.suffix != ".tmp")
@@ -274,11 +293,11 @@ def _prepare(
         if not resume:
             raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
         before = read_suite(out)
-    folders = _folders(list(dict.fromkeys([*(before.folders if before else ()), *agents])))
+    folders = folders_of(list(dict.fromkeys([*(before.folders if before else ()), *agents])))
     benchmark = next(iter(plans.values())).task.options.benchmark  # the parts of a suite belong to one
     content = Suite(
         suite=suite,
-        parts=tuple(part.name for part in SUITES[suite]),
+        parts=parts,
         benchmark=benchmark,
         benchmark_manifest_sha256=manifest_hash(benchmark),
         seed=seed,
@@ -299,7 +318,7 @@ def _prepare(
         write_json(out / SUITE, content.model_dump())
 
 
-def _folders(agents: Sequence[str]) -> dict[str, str]:
+def folders_of(agents: Sequence[str]) -> dict[str, str]:
     """Returns the name of each agent's folder: letters, digits, dots, dashes and underscores."""
     folders: dict[str, str] = {}
     for agent in agents:

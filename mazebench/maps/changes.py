@@ -151,7 +151,8 @@ def _make(plan: _Plan, strength: int) -> Change:
     if late < LATE_IN_PLAN:
         raise InputError(
             f"{plan.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
-            f"of the episodes, and before it has changed in at least {LATE_IN_PLAN}; found {late:.2f}"
+            f"of the episodes, and before it has changed in at least {LATE_IN_PLAN}, and not one so open "
+            f"that an old map costs nothing; found {late:.2f}"
         )
     found = plan.unchanged()
     for each in range(1, strength + 1):
@@ -274,7 +275,8 @@ def _changed_more(plan: _Plan, draft: Change, strength: int) -> Change:
         raise InputError(
             f"{plan.name}: expected changes of strength {strength}, by which a robot is late in {target} of the "
             f"episodes with the old map, and without a map in at least {LATE_WITHOUT_MAP} and at strength 1 in {WORTH} "
-            f"more than with it; found {late:.2f} with it and {plan.late_without_map(best.walls):.2f} without"
+            f"more than with it, and not one so open that an old map costs less; found {late:.2f} with it and "
+            f"{plan.late_without_map(best.walls):.2f} without"
         )
     return best
 

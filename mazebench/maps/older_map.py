@@ -23,7 +23,9 @@ from mazebench.maps.readers.occupancy_grid import (
     UNKNOWN,
     LocatedMaze,
     OccupancyGrid,
+    Pose,
     blocked_pixels,
+    moved_into,
     states_in_cells,
 )
 
@@ -38,6 +40,7 @@ class OlderMap:
     walls: np.ndarray  # [N, N] bool, True is wall
     maze: Maze
     pair: Pair | None = None  # None if the maze was made of the map
+    origin: Pose = (0.0, 0.0, 0.0)  # of the maze's lower left corner in the map's frame
 
     @functools.cached_property
     def joined(self) -> np.ndarray:
@@ -119,7 +122,8 @@ def lay_on(
     pair = compared(shown, built, maze.size, maze.cell_size, covered, pose)
     hint = "" if is_aligned or covered * met >= LEAST_FIT else "; few walls lie on each other: try --align"
     remark(f"{name}: {pair.describe(maze.name)}{hint}")
-    return OlderMap(walls, maze, pair)
+    origin = located.origin if pose is None else moved_into(located.origin, pose)
+    return OlderMap(walls, maze, pair, origin)
 
 
 def _require_one_frame(older: OccupancyGrid, newer: OccupancyGrid, name: str, of: str) -> None:

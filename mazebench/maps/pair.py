@@ -18,7 +18,7 @@ from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Pose
 
 # Of the picture: its longer side and the height of a line of its legend in pixels, and its colours.
 _PAIR_SIDE, _LINE = 900, 24
-_OF_PAIR = {"wall_now": (214, 61, 61), "free_now": (64, 161, 99), "on_one_map": (168, 200, 236)}
+OF_PAIR = {"wall_now": (214, 61, 61), "free_now": (64, 161, 99), "on_one_map": (168, 200, 236)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -88,20 +88,20 @@ def draw_pair(pair: Pair, maze: Maze) -> np.ndarray:
     Red cells are wall now, green ones free now, and blue ones are on one map only. Walls at the right and at the bottom
     that only make the maze square are left out.
     """
-    changed = {name: getattr(pair, name) for name in _OF_PAIR}
+    changed = {name: getattr(pair, name) for name in OF_PAIR}
     rows, columns = np.nonzero(~maze.walls | np.logical_or.reduce(list(changed.values())))
     height, width = rows.max() + 2, columns.max() + 2
     pixels = max(1, round(_PAIR_SIDE / max(height, width)))
     image = draw_grid(maze.walls, pixels)
     for name, cells in changed.items():
-        image[cells.repeat(pixels, axis=0).repeat(pixels, axis=1)] = _OF_PAIR[name]
+        image[cells.repeat(pixels, axis=0).repeat(pixels, axis=1)] = OF_PAIR[name]
     image = image[: height * pixels, : width * pixels]
 
     # A line of the legend for each difference, on white.
     legend = np.full((_LINE * len(changed) + _LINE // 2, max(image.shape[1], 18 * _LINE), 3), 255, np.uint8)
     for number, (name, area) in enumerate(pair.areas.items()):
         top = _LINE // 4 + number * _LINE
-        legend[top + 4 : top + _LINE - 4, 4:_LINE] = _OF_PAIR[name]
+        legend[top + 4 : top + _LINE - 4, 4:_LINE] = OF_PAIR[name]
         place, text = (_LINE + 8, top + _LINE - 7), f"{name.replace('_', ' ')}: {area:g} m2"
         cv2.putText(legend, text, place, cv2.FONT_HERSHEY_SIMPLEX, _LINE / 44, (0, 0, 0), 1, cv2.LINE_AA)
     sides = [(0, 0), (0, legend.shape[1] - image.shape[1]), (0, 0)]

@@ -104,7 +104,7 @@ function resultsOf(setting) {
   return data.results.flatMap((result, number) => (result.setting === setting ? [number] : []));
 }
 
-async function openResult(number, episode = null) {
+async function openResult(number, episode = null, group = null) {
   stop();
   const result = data.results[number];
   byId("setting").value = String(result.setting);
@@ -123,6 +123,7 @@ async function openResult(number, episode = null) {
     for (const id of ["maze", "distance", "group"]) byId(id).value = "";
     byId("failures").checked = false;
   }
+  if (group !== null) byId("group").value = result.groups[group];
   listEpisodes(episode);
 }
 
@@ -287,7 +288,8 @@ function drawDriven(current, ranges, color) {
 
 function describe() {
   const { current } = view;
-  byId("shown-caption").textContent = current.shown ? "The map that the agent was shown" : "The map that the agent was shown was not recorded";
+  const shown = data.results[view.result].hidden ? "The map, which was hidden from the agent" : "The map that the agent was shown";
+  byId("shown-caption").textContent = current.shown ? shown : "The map that the agent was shown was not recorded";
   byId("driven-caption").textContent = !current.path.x.length
     ? "The maze; the path was not recorded (eval --record)"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
@@ -352,10 +354,20 @@ function listen() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
 
-// The address may name an episode.
-const found = /^#episode=(\d+)-(\d+)$/.exec(location.hash);
-const isLinked = found && Number(found[2]) < (data.results[Number(found[1])] || { episodes: 0 }).episodes;
-const [first, linked] = isLinked ? [Number(found[1]), Number(found[2])] : [data.first, null];
+// An address may name an episode, and the group to list it in: #episode=RESULT-EPISODE or #episode=RESULT-EPISODE-GROUP.
+function linkedBy(address) {
+  const found = /^#episode=(\d+)-(\d+)(?:-(\d+))?$/.exec(address);
+  const [result, episode, group] = found ? found.slice(1).map((text) => (text === undefined ? null : Number(text))) : [];
+  return found && episode < (data.results[result] || { episodes: 0 }).episodes ? [result, episode, group] : null;
+}
+
+const linked = linkedBy(location.hash);
+const [first, ...rest] = linked || linkedBy(data.opens) || [data.first];
 fill(byId("setting"), data.settings.map((name, setting) => [setting, name]), data.results[first].setting);
 listen();
-openResult(first, linked).then(() => isLinked && byId("explorer").scrollIntoView());
+const opening = openResult(first, ...rest).then(() => linked && byId("explorer").scrollIntoView());
+addEventListener("hashchange", async () => {
+  const wanted = linkedBy(location.hash);
+  await opening;
+  if (wanted) openResult(...wanted).then(() => byId("explorer").scrollIntoView());
+});

@@ -48,6 +48,30 @@ def build_page(
 
     `head` describes the results in a line. `figures` are those of tables, by their names, and `of_paper` others.
     """
+    # Tables with their figures, the other figures, then tables without one. Each has a title, a note and values.
+    drawn = [(table, figures[table.name]) for table in tables if table.name in figures]
+    sections: list[tuple[Table | Drawn, str, Iterable[pd.DataFrame]]] = [
+        (table, as_svg(figure), map(table.wide, table.metrics)) for table, figure in drawn
+    ]
+    sections += [(each, as_svg(each.figure), [each.values]) for each in of_paper]
+    sections += [(table, "", map(table.wide, table.metrics)) for table in tables if table.name not in figures]
+    citation = "{authors}, {title}. {note}".format_map(reference())
+    told: dict[str, Any] = {"subtitle": head, "warnings": warnings, "citation": citation, "sections": sections}
+    return with_explorer("page.html", results, provenance, **told)
+
+
+def with_explorer(
+    template: str, results: Sequence[ReportedResult], provenance: pd.DataFrame, opens: str = "", **told: Any
+) -> str:
+    """Returns a page with the explorer of all results as HTML.
+
+    Args:
+      template: the file of the page, which extends frame.html.
+      results: what the explorer has.
+      provenance: where results come from.
+      opens: the episode at which the explorer opens, as the address names one; by default the first one.
+      **told: further values for the template.
+    """
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
     columns: dict[str, int] = {}  # JSON, deflated, in base64, with their numbers
@@ -56,26 +80,22 @@ def build_page(
         parts = (json.dumps(each, separators=(",", ":")) for each in (_trials(result), _outcomes(result)))
         packed = (_base64(zlib.compress(part.encode("ascii"), 9)) for part in parts)
         used.append([columns.setdefault(each, len(columns)) for each in packed])
-    # Tables with their figures, the other figures, then tables without one. Each has a title, a note and values.
-    drawn = [(table, figures[table.name]) for table in tables if table.name in figures]
-    sections: list[tuple[Table | Drawn, str, Iterable[pd.DataFrame]]] = [
-        (table, _base64(to_svg(figure)), map(table.wide, table.metrics)) for table, figure in drawn
-    ]
-    sections += [(each, _base64(to_svg(each.figure)), [each.values]) for each in of_paper]
-    sections += [(table, "", map(table.wide, table.metrics)) for table in tables if table.name not in figures]
-    return jinja2.Template(_read("page.html"), autoescape=True).render(
+    templates = jinja2.Environment(loader=jinja2.PackageLoader("mazebench", "report"), autoescape=True)
+    return templates.get_template(template).render(
+        **told,
         style=style,
         style_hash=_hash(style),
-        subtitle=head,
-        warnings=warnings,
-        citation="{authors}, {title}. {note}".format_map(reference()),
-        sections=sections,
         provenance=provenance.to_html(index=False, border=0),
-        data=_explorer_data(results, used),
+        data=_explorer_data(results, used) | {"opens": opens},
         columns=columns,
         script=script,
         script_hash=_hash(script),
     )
+
+
+def as_svg(figure: Figure) -> str:
+    """Returns a figure as SVG in base64, as the pages hold it."""
+    return _base64(to_svg(figure))
 
 
 def _read(name: str) -> str:
@@ -113,6 +133,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
                 "picture": 0 if not maps or maps[0].are_cells else len(maps[0].walls),  # pixels a side, if no cells
                 "lidar": task.options.lidar.max_range if task and "lidar" in task.options.sensors else 0,  # m
                 "groups": result.facts,
+                "hidden": "map" in result.summary.task.hide,
             }
         )
     # The explorer opens with a result that has paths, hierarchical if there is such a one.

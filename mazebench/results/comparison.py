@@ -8,6 +8,7 @@ docs/metrics.md has the definitions.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import pathlib
 from collections.abc import Iterable
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.results.intervals import Estimate, difference_interval
-from mazebench.results.metrics import by_distance, scores
+from mazebench.results.metrics import by_distance, by_fact, scores
 from mazebench.results.naming import noise_in_words, title_of
 from mazebench.results.reading import Result, find_parts, load_result
 from mazebench.results.records import Record, Summary, column
@@ -24,6 +25,7 @@ from mazebench.results.records import Record, Summary, column
 # What must be equal, of tasks, of their provenance and of records: what was played, whatever was shown.
 _SAME_TASK = ("benchmark", "task", "size", "cell_size", "split_in_results", "num_goals")
 _SAME_PROVENANCE = ("benchmark_manifest_sha256", "mazes_sha256")
+_ENOUGH = 20  # episodes of a bin of distances
 _SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")
 
 
@@ -51,6 +53,8 @@ class PairedResults:
 
     overall: Row
     by_distance: dict[int, Row]  # by distance from start to goal: in cells, on tracks in metres
+    by_fact: dict[str, Row] = dataclasses.field(default_factory=dict)  # "blocked" and "not blocked", on tracks
+    by_bin: dict[str, Row] = dataclasses.field(default_factory=dict)  # of distances with enough episodes, in words
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +65,7 @@ class Comparison:
     parts: dict[str, PairedResults]  # by part of a suite; two single evaluations have the one part ""
     has_distances: bool  # whether a table by distance makes sense
     notes: list[str]  # on parts that only one folder has
+    worth: str = ""  # which difference of the on-time rates is a map worth, in words
 
 
 def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
@@ -89,6 +94,7 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
         parts={name: compare_results(*pair) for name, pair in pairs.items()},
         has_distances=not task.is_hierarchical,
         notes=notes,
+        worth=_worth(first, second),
     )
 
 
@@ -103,12 +109,33 @@ def compare_results(a: Result, b: Result) -> PairedResults:
     pairs = paired_records(a, b)
     of_ours, of_theirs = zip(*pairs, strict=True)
     ours, theirs = by_distance(of_ours), by_distance(of_theirs)
+    at = {distance: list(zip(ours[distance], theirs[distance], strict=True)) for distance in ours}
+    facts = {name: holds for name, holds in by_fact(of_ours).items() if name.removeprefix("not ") == "blocked"}
+    unit = "cells" if a.summary.task.track is None else "m"
     return PairedResults(
         overall=compare_records(pairs),
-        by_distance={
-            distance: compare_records(zip(ours[distance], theirs[distance], strict=True)) for distance in ours
+        by_distance={distance: compare_records(own) for distance, own in at.items()},
+        by_fact={
+            name: compare_records(itertools.compress(pairs, holds)) for name, holds in facts.items() if holds.any()
         },
+        by_bin={f"{name} {unit}": compare_records(own) for name, own in _bins(at).items()},
     )
+
+
+def _bins(at: dict[int, list[tuple[Record, Record]]]) -> dict[str, list[tuple[Record, Record]]]:
+    """Returns the pairs of neighbouring distances with enough episodes, such as "15-17"; none for a single bin."""
+    bins: list[tuple[list[int], list[tuple[Record, Record]]]] = []
+    for distance, own in at.items():
+        if not bins or len(bins[-1][1]) >= _ENOUGH:
+            bins.append(([], []))
+        bins[-1][0].append(distance)
+        bins[-1][1].extend(own)
+    if len(bins) > 1 and len(bins[-1][1]) < _ENOUGH:
+        distances, own = bins.pop()
+        bins[-1][0].extend(distances)
+        bins[-1][1].extend(own)
+    named = {"-".join(map(str, dict.fromkeys((each[0], each[-1])))): own for each, own in bins}
+    return named if len(named) > 1 else {}
 
 
 def paired_records(a: Result, b: Result, *, of_one_map: bool = True) -> list[tuple[Record, Record]]:
@@ -148,12 +175,14 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
 
     Returns:
       dict: {"overall": {"n", "win_share", "win_share_ci95", and of each metric M of `metrics.scores`
-       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...}}
+       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...},
+       "by_fact": {"blocked": {the same}, ...}}
     """
     parts = {
         name: {
             "overall": _row_to_json(part.overall),
             "by_distance": {str(distance): _row_to_json(row) for distance, row in part.by_distance.items()},
+            "by_fact": {name: _row_to_json(row) for name, row in part.by_fact.items()},
         }
         for name, part in comparison.parts.items()
     }
@@ -189,6 +218,14 @@ def _row_to_json(row: Row) -> dict[str, Any]:
         content |= {f"{metric}_difference_ci95": [difference.low, difference.high]}
     win_share = row.win_share
     return content | {"win_share": win_share.value, "win_share_ci95": [win_share.low, win_share.high]}
+
+
+def _worth(a: Summary, b: Summary) -> str:
+    """Returns which difference of the on-time rates is a map worth; empty if none is."""
+    shown, hidden = [(), ("map",)], [each.task.hide for each in (a, b)]
+    if (a.agent, a.config) != (b.agent, b.config) or hidden not in (shown, shown[::-1]):
+        return ""
+    return f"{'A - B' if hidden == shown else 'B - A'}, on time: the map worth of {a.agent}"
 
 
 def _who(summary: Summary, parts: list[str]) -> str:

@@ -73,8 +73,8 @@ def mean_interval(values: np.ndarray, mazes: np.ndarray) -> Estimate:
     return Estimate(mean, *wilson_interval(mean, len(values) / effect))
 
 
-def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
-    """Returns the mean of paired differences in [-1, 1] with the interval of a bootstrap over mazes.
+def difference_interval(differences: np.ndarray, mazes: np.ndarray, largest: float = 1.0) -> Estimate:
+    """Returns the mean of paired differences in [-largest, largest] with the interval of a bootstrap over mazes.
 
     Whole mazes are drawn again with replacement, always by the same random numbers (Efron and Tibshirani 1993, ch. 13).
     The quantiles of the means of these draws are moved away from the mean by the factor
@@ -86,9 +86,13 @@ def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
     draw tells how far others might be, and from 1,000 mazes on. docs/intervals.md has a simulation of the coverage.
 
     Args:
-      differences: `[E]` in [-1, 1], of one episode each.
+      differences: `[E]` in [-largest, largest], of one episode each.
       mazes: `[E]`, any names or numbers.
+      largest: above 0, in the unit of the differences.
     """
+    if largest != 1:
+        of_unit = difference_interval(differences / largest, mazes)
+        return Estimate(*(largest * end for end in (of_unit.value, of_unit.low, of_unit.high)))
     clusters = _clusters(mazes)
     mean = float(np.mean(differences))
     num_clusters = int(clusters.max()) + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import csv
 import dataclasses
 import functools
@@ -257,17 +258,38 @@ def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DIS
         if start is not None and goal is not None:
             distances = [maze.distance(start, goal)]
         whole, rest = divmod(_PER_MAZE, len(distances))
-        for number, distance in enumerate(distances):
-            rng = np.random.default_rng([seed, maze.size, index, distance])
-            seen: set[tuple[Cell, Cell]] = set()
-            for _ in range(episodes_per_distance or whole + (number < rest)):
-                # A pair that was not drawn before, if one is found.
-                for _ in range(_MAX_DRAWS):
-                    pair = sample_pair(maze, distance, rng, start, goal, joined)
-                    if pair not in seen:
-                        break
-                seen.add(pair)
-                trials.append(make_trial(maze, index, pair, rng, task.body))
+        counts = {each: episodes_per_distance or whole + (number < rest) for number, each in enumerate(distances)}
+        trials += _draw_in_maze(task, index, counts, seed)
+    return trials
+
+
+def spread_trials(task: Task, count: int, seed: int = 0) -> list[Trial]:
+    """Draws `count` episodes of a task as `draw_trials` does, spread over the mazes, and there over the distances."""
+    trials, distances, num_mazes = [], sorted(set(task.distances)), len(task.mazes)
+    for index in range(num_mazes):
+        own = count // num_mazes + (index < count % num_mazes)
+        # From the shortest to the longest, a little apart from those in the other mazes.
+        shares = (np.arange(own) + (index + 0.5) / num_mazes) / max(own, 1)
+        counts = collections.Counter(distances[int(share * len(distances))] for share in shares)
+        trials += _draw_in_maze(task, index, counts, seed)
+    return trials
+
+
+def _draw_in_maze(task: Task, index: int, counts: Mapping[int, int], seed: int) -> list[Trial]:
+    """Draws so many episodes at each distance in maze number `index`."""
+    trials, maze = [], task.arena.fixed_mazes[index]
+    (start, goal), joined = task.arena.ends(index), task.arena.joined(index)
+    for distance, count in counts.items():
+        rng = np.random.default_rng([seed, maze.size, index, distance])
+        seen: set[tuple[Cell, Cell]] = set()
+        for _ in range(count):
+            # A pair that was not drawn before, if one is found.
+            for _ in range(_MAX_DRAWS):
+                pair = sample_pair(maze, distance, rng, start, goal, joined)
+                if pair not in seen:
+                    break
+            seen.add(pair)
+            trials.append(make_trial(maze, index, pair, rng, task.body))
     return trials
 
 

@@ -97,15 +97,15 @@ def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: 
     states = np.pad(grid.states, 1, constant_values=UNKNOWN)
     height, width = states.shape
     corner = np.array([-1.0, -1.0]) * grid.resolution  # of the padded pixels, in the frame that is turned as the map is
-    cells_in_map = _moved(origin, grid.origin)
-    map_in_cells = _moved(grid.origin, origin)
+    cells_in_map = moved_into(origin, grid.origin)
+    map_in_cells = moved_into(grid.origin, origin)
 
     # The pixel under the centre of each cell; some rows at a time, as there may be as many cells as pixels.
     laid = np.empty(shape, dtype=np.int8)
     right = (np.arange(shape[1]) + 0.5) * cell_size
     for begin in range(0, shape[0], _ROWS_AT_ONCE):
         rows = np.arange(begin, min(begin + _ROWS_AT_ONCE, shape[0]))
-        x, y = _transformed(cells_in_map, right, (shape[0] - rows[:, None] - 0.5) * cell_size)
+        x, y = points_from(cells_in_map, right, (shape[0] - rows[:, None] - 0.5) * cell_size)
         columns = np.clip(np.floor((x - corner[0]) / grid.resolution + _TIE), 0, width - 1).astype(np.intp)
         from_below = np.clip(np.floor((y - corner[1]) / grid.resolution + _TIE), 0, height - 1).astype(np.intp)
         laid[rows] = states[height - 1 - from_below, columns]
@@ -114,7 +114,7 @@ def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: 
     for state in (UNKNOWN, OCCUPIED):
         has_state = (states == state).astype(np.uint8)
         rows, columns = np.nonzero(has_state & (cv2.erode(has_state, np.ones((3, 3)), borderValue=0) == 0))
-        x, y = _transformed(
+        x, y = points_from(
             map_in_cells,
             corner[0] + (columns + 0.5) * grid.resolution,
             corner[1] + (height - rows - 0.5) * grid.resolution,
@@ -127,7 +127,7 @@ def states_in_cells(grid: OccupancyGrid, origin: Pose, cell_size: float, shape: 
     return laid
 
 
-def _moved(origin: Pose, into: Pose) -> Pose:
+def moved_into(origin: Pose, into: Pose) -> Pose:
     """Returns an origin in the frame of another origin."""
     x, y, yaw = origin
     cosine, sine = math.cos(into[2]), math.sin(into[2])
@@ -135,7 +135,7 @@ def _moved(origin: Pose, into: Pose) -> Pose:
     return cosine * right + sine * up, cosine * up - sine * right, yaw - into[2]
 
 
-def _transformed(origin: Pose, right: Any, up: Any) -> tuple[Any, Any]:
+def points_from(origin: Pose, right: Any, up: Any) -> tuple[Any, Any]:
     """Returns points that are given from an origin in the frame of that origin; exactly so if it is not turned."""
     x, y, yaw = origin
     if not yaw:
@@ -219,7 +219,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
     top, left = (span.start for span in known_box(grid.states))
     from_left, from_top = left + cells.right + column * pixels, top + cells.down + row * pixels
     from_below = len(grid.states) - from_top - size * pixels
-    corner = _transformed(grid.origin, from_left * grid.resolution, from_below * grid.resolution)
+    corner = points_from(grid.origin, from_left * grid.resolution, from_below * grid.resolution)
     origin = *corner, grid.origin[2]
 
     # What a user should know.
@@ -265,17 +265,17 @@ def _known_part(grid: OccupancyGrid) -> OccupancyGrid:
     """Returns a map without the rows and columns around it of which nothing is known; all of it if nothing is."""
     rows, columns = known_box(grid.states)
     right, up = columns.start * grid.resolution, (len(grid.states) - rows.stop) * grid.resolution
-    x, y = _transformed(grid.origin, right, up)
+    x, y = points_from(grid.origin, right, up)
     return dataclasses.replace(grid, states=grid.states[rows, columns], origin=(float(x), float(y), grid.origin[2]))
 
 
 def _turned(grid: OccupancyGrid, turn: float) -> OccupancyGrid:
     """Returns a map in pixels that are turned by `turn` rad, with unknown ones in the corners."""
     height, width = np.array(grid.states.shape) * grid.resolution
-    x, y = _transformed((0.0, 0.0, -turn), np.array([0, width, 0, width]), np.array([0, 0, height, height]))
+    x, y = points_from((0.0, 0.0, -turn), np.array([0, width, 0, width]), np.array([0, 0, height, height]))
     shape = math.ceil(np.ptp(y) / grid.resolution), math.ceil(np.ptp(x) / grid.resolution)
-    corner = _transformed((0.0, 0.0, turn), x.min(), y.min())
-    x, y = _transformed(grid.origin, *corner)
+    corner = points_from((0.0, 0.0, turn), x.min(), y.min())
+    x, y = points_from(grid.origin, *corner)
     origin = float(x), float(y), grid.origin[2] + turn
     return dataclasses.replace(grid, states=states_in_cells(grid, origin, grid.resolution, shape), origin=origin)
 
@@ -286,7 +286,7 @@ def _pixels_on(
     """Returns on which rows and columns of pixels of `part` those of a picture have their centre."""
     right = (columns + 0.5) * picture.resolution
     up = (len(picture.states) - rows - 0.5) * picture.resolution
-    x, y = _transformed(_moved(picture.origin, part.origin), right, up)
+    x, y = points_from(moved_into(picture.origin, part.origin), right, up)
     from_below, from_left = (np.floor(along / part.resolution + _TIE).astype(np.int32) for along in (y, x))
     return len(part.states) - 1 - from_below, from_left
 
@@ -389,7 +389,7 @@ def _describe_lost(
     for region in lost[:_MOST_NAMED]:
         right = (region.column + 0.5) * picture.resolution
         up = (len(clear) - region.row - 0.5) * picture.resolution
-        x, y = _transformed(picture.origin, right, up)
+        x, y = points_from(picture.origin, right, up)
         way = f"by a way {region.width:.2g} m wide" if region.width else "closed on all sides"
         named.append(f"{region.area:,.3g} m2 at ({x:.1f}, {y:.1f}) m, {way}")
     others = len(lost) - len(named)
