@@ -155,6 +155,9 @@ class TestPage:
         assert browser.run("document.getElementById('count').textContent") == f"{TRIPS} of {TRIPS} episodes"
         browser.run("document.querySelector('.spots a').click()")
         browser.wait_for("document.getElementById('group').value.startsWith('1: (10.5, 19.5)')")
+        browser.run("document.getElementById('agent').value = '2'")
+        browser.run("document.getElementById('agent').dispatchEvent(new Event('change'))")
+        browser.wait_for("document.getElementById('shown-caption').textContent.includes('hidden from the agent')")
         assert browser.errors == []
 
 
