@@ -392,7 +392,7 @@ def draw_check() -> None:
         maps = ("--mazes", f"{PREFIX}{CHECKED}", "--shown", f"{PREFIX}{building_of(CHECKED).older}")
         command = (sys.executable, "-m", "mazebench", "check-map", *maps, "--out", name)
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        hidden = "nav, .skip, #explorer, #results, .note, .figure:last-child {display: none} main {max-width: 900px}"
+        hidden = "nav, .skip, #explorer, #results, .note {display: none} main {max-width: 900px}"
         _take(pathlib.Path(name) / "index.html", "check-map", hidden, "900,1120")
 
 

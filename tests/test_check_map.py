@@ -6,10 +6,12 @@ import csv
 import json
 import re
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from faults import COMMAND
 from simple_mazes import field
 
 from mazebench.evaluation.map_check import plan_check
@@ -45,23 +47,11 @@ def write_maps(folder) -> tuple[str, ...]:
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory):
     """The folder of a finished check, the arguments that made it, and what was printed."""
-    import contextlib
-    import io
-    import sys
-
-    from mazebench import cli
-
     folder = tmp_path_factory.mktemp("check")
     arguments = ("check-map", *write_maps(folder), "--out", str(folder / "check"))
-    output, before = io.StringIO(), sys.argv
-    try:
-        sys.argv = ["mazebench", *arguments]
-        with contextlib.redirect_stdout(output), pytest.raises(SystemExit) as caught:
-            cli.main()
-    finally:
-        sys.argv = before
-    assert caught.value.code == 0
-    return folder / "check", arguments, output.getvalue()
+    run = subprocess.run([COMMAND, *arguments], text=True, capture_output=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return folder / "check", arguments, run.stdout
 
 
 def records_of(folder, part):
@@ -165,6 +155,9 @@ class TestPage:
         assert browser.run("document.getElementById('count').textContent") == f"{TRIPS} of {TRIPS} episodes"
         browser.run("document.querySelector('.spots a').click()")
         browser.wait_for("document.getElementById('group').value.startsWith('1: (10.5, 19.5)')")
+        browser.run("document.getElementById('agent').value = '2'")
+        browser.run("document.getElementById('agent').dispatchEvent(new Event('change'))")
+        browser.wait_for("document.getElementById('shown-caption').textContent.includes('hidden from the agent')")
         assert browser.errors == []
 
 

@@ -28,7 +28,9 @@ def check_map(
     values: dict[str, Any],
     agents: Annotated[
         list[str] | None,
-        typer.Option("--agent", help="Who drives: an installed agent or module:Class; repeatable; navigator."),
+        typer.Option(
+            "--agent", help="Who drives: an installed agent or module:Class; navigator if not given. Repeatable."
+        ),
     ] = None,
     strength: Annotated[
         int | None,

@@ -48,9 +48,10 @@ def train(
 
     options = TrainOptions(agent=agent, **options_in(values, TrainOptions))
     folder = out or pathlib.Path("runs") / _folder_name(options, values)
-    if (seeds is None and cluster) or (seeds is not None and "seed" in values):
-        raise InputError("expected --seeds, with --cluster and without --seed")
-    read_cluster(cluster)
+    if read_cluster(cluster) and seeds is None:
+        raise InputError(f"expected --seeds with --cluster {cluster}, found none")
+    if seeds is not None and "seed" in values:
+        raise InputError("expected --seed or --seeds, found both")
     numbers = () if seeds is None else parse_numbers("seeds", seeds, least=0)
     folders = {
         seed: out / str(seed) if out else pathlib.Path("runs") / _folder_name(options.replace(seed=seed), values)

@@ -131,21 +131,22 @@ class Pool:
     def _submit(self, plan: Plan, chunk: Chunk) -> concurrent.futures.Future[_Ended]:
         assert self._executor is not None
         packed = _packed(plan, self.is_external)
-        if self.is_external:
-            return self._executor.submit(_run_until_stopped, packed, chunk)
-
-        # Workers start here. They inherit that SIGINT is blocked, and so leave Ctrl-C to this process. The tracker,
-        # which would start with the first of them, undoes the mask.
-        multiprocessing.resource_tracker.ensure_running()
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        if not self.is_external:  # whose workers start here; the tracker, which starts with the first, undoes the mask
+            multiprocessing.resource_tracker.ensure_running()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: workers leave Ctrl-C to this one
         before = set(multiprocessing.active_children())
         try:
             return self._executor.submit(_run_until_stopped, packed, chunk)
+        except concurrent.futures.BrokenExecutor as error:  # since a worker ended, as the chunks before will tell
+            future = concurrent.futures.Future[_Ended]()
+            future.set_exception(error)
+            return future
         except OSError as error:
             way = "; raise the limit by `ulimit -n`, or use fewer" * (error.errno == errno.EMFILE)
             raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}{way}") from error
         finally:
-            self._processes |= set(multiprocessing.active_children()) - before
+            if not self.is_external:
+                self._processes |= set(multiprocessing.active_children()) - before
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
     def _ended(self, future: concurrent.futures.Future[_Ended]) -> _Ended:
