@@ -48,7 +48,7 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
     if not rules.active.any():
         raise InputError("expected a call to reset() before that of labels(), found no episode under way")
     if envs not in _experts:
-        _experts[envs] = Expert(envs.task.mazes, envs.num_envs, envs.task.body)
+        _experts[envs] = Expert(envs.task.standing, envs.num_envs, envs.task.body)
     found = _experts[envs].costs(rules.maze, rules.target, rules.pose, envs.velocity())
     return found if costs else found.argmin(axis=1)
 

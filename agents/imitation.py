@@ -55,7 +55,7 @@ class ImitationLearner(RolloutLearner):
         super().__init__(actor, seed)
         self.num_kept, self.drive_steps = actor.config.kept_rollouts, actor.config.drive_steps
         self.num_ahead = 0 if self.drive_steps else 1  # no step of a drive that is cut goes with those of another one
-        self._expert = Expert(task.mazes, actor.config.num_envs, task.body)
+        self._expert = Expert(task.standing, actor.config.num_envs, task.body)
 
     def driven(self, scene: Scene, actions: np.ndarray) -> np.ndarray:
         """Returns the oracle's actions, some of them random, in the first environments, and the actor's in the rest."""

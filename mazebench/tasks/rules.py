@@ -11,10 +11,11 @@ from mazebench.maps.kinds import KINDS
 from mazebench.maps.maze import Cell
 from mazebench.maps.real_buildings import ORIGINS
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode, episode_level, perturbations_of
+from mazebench.tasks.episode import Episode, episode_level, perturbations_of, schedule_of
 from mazebench.tasks.observation import Noise, OpenSensors, state_errors
 from mazebench.tasks.perturbations.perturbation import Of, ShownMap, Standing, StateError
 from mazebench.tasks.route import Event, Route, plan_route
+from mazebench.tasks.schedule import DoorKeeper, Schedule
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import PROGRESS
@@ -22,9 +23,10 @@ from mazebench.tasks.tracks import TRACKS
 from mazebench.world.angles import wrap_angle
 
 _UNKNOWN = -1  # a way that would take long to measure
+_WAITS = 0.05  # m; a step in which the body moves less counts as waited
 _OUT_OF_SIGHT = 1e6  # m, where cameras do not see the goal's disc
 _INFOS = (  # what `Rules.infos` describes, in this order
-    *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
+    *("is_first", "success", "goal_reached", "steps", "waited", "path_length", "position", "yaw", "maze", "landmark"),
     *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
 )
 
@@ -120,7 +122,7 @@ class Rules:
         self.way_left = np.zeros(num_envs, dtype=np.int64)  # see `infos`
         self.progress = np.zeros(num_envs)  # cells by which the last step made the way shorter, if it is rewarded
         self.path_length = np.zeros(num_envs)  # m
-        self.steps = np.zeros(num_envs, dtype=np.int64)
+        self.steps, self.waited = np.zeros((2, num_envs), dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
         self.goal_reached = np.zeros(num_envs, dtype=bool)  # also a goal that another one follows
 
@@ -144,19 +146,21 @@ class Rules:
         changes = (each.standing(rng) for each, rng in perturbations_of(task, episode, Of.BUILDING))
         if standing := [change for change in changes if change is not None]:
             self._standing[i] = standing
+        if (schedule := schedule_of(task, episode)) is not None:
+            self._standing[i] = [*standing, DoorKeeper(schedule, len(task.mazes))]
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
         self.level[i] = 0 if task.options.track is None else episode_level(task, episode)
         self.track[i] = task.options.track or ""
         self.pose[i] = (*maze.point(episode.start), episode.yaw)
-        self.path_length[i] = self.steps[i] = self.progress[i] = 0
+        self.path_length[i] = self.steps[i] = self.waited[i] = self.progress[i] = 0
         self.cell[i] = episode.start[0] * task.size + episode.start[1]
         self._seek(i, route, shown)
         self._begin_leg(i, route, shown)
 
     def _seek(self, i: int, route: Route, shown: ShownMap) -> None:
         """Measures the way to the goal of environment i, which is new."""
-        maze, start = self.task.mazes[self.maze[i]], route.cells[0]
+        maze, start = self.task.standing[self.maze.item(i)].as_built, route.cells[0]
         self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, (start, route.goal))
         self.distance[i] = self.way_left[i] = _UNKNOWN
         self._ways[i] = None
@@ -171,7 +175,7 @@ class Rules:
         self.context[i] = leg_context(self.task, shown, route.start, route.target)
         cells = np.array([route.start, route.target, route.goal])
         self.start[i], self.target[i], self._goal[i] = cells @ (size, 1)
-        self.marker[i, :2] = self.task.mazes[self.maze[i]].point(route.goal)
+        self.marker[i, :2] = self.task.standing[self.maze.item(i)].point(route.goal)
         self.time_limit[i], self._deadline[i] = route.time_limit, route.deadline
         self.landmark[i] = route.leg
 
@@ -196,9 +200,11 @@ class Rules:
             happened.fill(0)
         moved = poses[:, :2] - self.pose[:, :2]
         moved *= moved
-        self.path_length += np.sqrt(moved[:, 0] + moved[:, 1])
+        moved = np.sqrt(moved[:, 0] + moved[:, 1])
+        self.path_length += moved
         self.pose[:] = poses
         self.steps += running
+        self.waited += (moved < _WAITS) & running
 
         # All mazes have one size and one cell size, so the first one converts the points of all.
         cells = self.task.mazes[0].cell_index(self.pose[:, :2])
@@ -217,7 +223,9 @@ class Rules:
         self.progress[0] = 0.0
         (last_x, last_y, _), (x, y, _) = self.pose[0].tolist(), pose.tolist()
         moved_x, moved_y = x - last_x, y - last_y
-        self.path_length[0] += math.sqrt(moved_x * moved_x + moved_y * moved_y)
+        moved = math.sqrt(moved_x * moved_x + moved_y * moved_y)
+        self.path_length[0] += moved
+        self.waited[0] += moved < _WAITS
         self.pose[0] = pose
         self.steps[0] = steps = self.steps.item(0) + 1
         row, column = cell = self.task.mazes[0].cell_at(x, y)
@@ -255,19 +263,27 @@ class Rules:
     def _change(self, running: np.ndarray) -> list[int]:
         """Exchanges the mazes of buildings that change now, and measures the ways in them; returns where."""
         changed = []
+        runs, steps, cells, mazes = (each.tolist() for each in (running, self.steps, self.cell, self.maze))
         for i, standing in self._standing.items():
-            if not running[i]:
+            if not runs[i]:
                 continue
-            before, cell = self.maze.item(i), divmod(self.cell.item(i), self.task.size)
+            maze = mazes[i]
             for stands in standing:
-                self.maze[i] = stands(self.steps.item(i), self.maze.item(i), cell)
-            if self.maze[i] == before:
+                maze = stands(steps[i], maze, divmod(cells[i], self.task.size))
+            if maze == mazes[i]:
                 continue
             changed.append(i)
-            if self._ways[i] is not None and (route := self.routes[i]) is not None:
-                self._ways[i] = ways = self.task.mazes[self.maze[i]].distances(route.goal).ravel()
-                self.way_left[i] = ways[self.cell[i]]
-        return changed
+            self.maze[i] = maze
+            built, before = (self.task.standing[number].as_built for number in (maze, mazes[i]))
+            if built is not before and self._ways[i] is not None and (route := self.routes[i]) is not None:
+                self._ways[i] = ways = built.distances(route.goal).ravel()
+                self.way_left[i] = ways[cells[i]]
+        return sorted(changed)
+
+    def schedules(self) -> list[Schedule | None]:
+        """Returns the schedule of the doors in each environment; None where none moves."""
+        keepers = [self._standing.get(i, [None])[-1] for i in range(len(self.maze))]
+        return [keeper.schedule if isinstance(keeper, DoorKeeper) else None for keeper in keepers]
 
     def rewards(self) -> np.ndarray:
         """Returns the rewards `[B]` float32 of the last step."""
@@ -302,11 +318,13 @@ class Rules:
         - is_first: bool, whether the context is new: an episode or the leg to the next landmark began.
         - success: bool, whether the last goal is reached. goal_reached: whether the step reached a goal, which
           another one may follow.
-        - steps: since the episode began. path_length: m. landmark: the leg's index.
+        - steps: since the episode began. waited: those of them in which the body moved less than 0.05 m.
+        - path_length: m. landmark: the leg's index.
         - time_limit: the agent steps of the leg; on a track they depend on its distance. steps_left: of them.
         - position: `[B, 2]` m, and yaw: rad, both the true ones.
         - distance: the cells of a shortest path from start to goal in the true maze. way_left: from the body to the
           goal. They are -1 in a maze of more than 2,048 free cells, where they take long, unless progress is rewarded.
+          Doors that close while one drives count as open.
         - blocked: bool, whether a wall of the true maze stands in the shortest path on the shown map.
         - Of several goals, these three are of the present one.
         - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
@@ -317,6 +335,7 @@ class Rules:
             "position": self.pose[:, :2],
             "yaw": wrap_angle(self.pose[:, 2]),
             "steps_left": self._deadline - self.steps,
+            "maze": self.maze % len(self.task.mazes),
         }
         return {name: values[name].copy() for name in _INFOS}
 
@@ -328,10 +347,11 @@ class Rules:
             "success": self.reached.item(i),
             "goal_reached": self.goal_reached.item(i),
             "steps": steps,
+            "waited": self.waited.item(i),
             "path_length": self.path_length.item(i),
             "position": self.pose[i, :2].copy(),
             "yaw": wrap_angle(self.pose.item(i, 2)),
-            "maze": self.maze.item(i),
+            "maze": self.maze.item(i) % len(self.task.mazes),
             "landmark": self.landmark.item(i),
             "time_limit": self.time_limit.item(i),
             "steps_left": self._deadline.item(i) - steps,

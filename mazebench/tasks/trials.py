@@ -13,6 +13,7 @@ import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.maps.benchmark import (
+    DOORS_BENCHMARK,
     GOALS_BENCHMARK,
     KINDS_SIZE,
     MAZES_PER_SPLIT,
@@ -24,7 +25,8 @@ from mazebench.maps.benchmark import (
 )
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.real_buildings import building_of
-from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair
+from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair, sample_pair_of
+from mazebench.tasks.streams import DOORS
 from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import DISTANCES
@@ -72,6 +74,11 @@ class Trial:
 def episodes_file(task: str, size: int, split: str = "eval") -> str:
     """Returns the name of the file with the frozen episodes of one task, size and split."""
     return f"episodes-{task}-{size}-{split}.csv"
+
+
+def doors_file(level: int, split: str) -> str:
+    """Returns the name of the file with the frozen episodes of one level and split of the track `doors`."""
+    return episodes_file(f"{DOORS}-{level}", KINDS_SIZE, split)
 
 
 def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split: str = "eval") -> tuple[Trial, ...]:
@@ -177,7 +184,10 @@ def _select_frozen(task: Task, wanted: int, episodes_per_maze: int | None) -> Se
         return [with_later_legs(task, trial) for trial in own[:episodes_per_maze]]
     episodes_per_maze = episodes_per_maze or FROZEN_PER_MAZE
     if task.options.track is not None:
-        rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
+        if task.moves_doors:
+            rows = _frozen_rows(f"{DOORS}-{task.options.track_level}", task.size, DOORS_BENCHMARK, frozen_split)
+        else:
+            rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
         chosen = [
             index
             for index, row in enumerate(rows)
@@ -187,7 +197,7 @@ def _select_frozen(task: Task, wanted: int, episodes_per_maze: int | None) -> Se
         trials = _FrozenTrials([rows[index] for index in chosen])
         if task.options.num_goals == 1:
             return trials
-        are_frozen = task.distances == DISTANCES
+        are_frozen = task.distances == DISTANCES and not task.moves_doors
         later = frozen_legs(frozen_split, _FrozenTrials(rows)) if are_frozen else [()] * len(rows)
         return [with_later_legs(task, trial, later[index]) for index, trial in zip(chosen, trials, strict=True)]
     if task.options.is_hierarchical:
@@ -263,7 +273,7 @@ def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DIS
             for _ in range(episodes_per_distance or whole + (number < rest)):
                 # A pair that was not drawn before, if one is found.
                 for _ in range(_MAX_DRAWS):
-                    pair = sample_pair(maze, distance, rng, start, goal, joined)
+                    pair = sample_pair_of(task, index, distance, rng)
                     if pair not in seen:
                         break
                 seen.add(pair)
