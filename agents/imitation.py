@@ -62,14 +62,17 @@ class ImitationLearner(RolloutLearner):
         num_driven = round(self._config.oracle_drives * len(actions))
         if not num_driven:
             return actions
-        best = self._expert.costs(scene.maze, scene.goal, scene.pose, scene.velocity)[:num_driven].argmin(axis=1)
+        best = self._expert.costs(scene.maze, scene.goal, scene.pose, scene.velocity, scene.step, scene.doors)[
+            :num_driven
+        ].argmin(axis=1)
         at_random = self.rng.random(num_driven) < self._config.random_actions
         best = np.where(at_random, self.rng.integers(NUM_ACTIONS, size=num_driven), best)
         return np.concatenate([best, actions[num_driven:]])
 
     def seen(self, experience: Experience) -> Seen:
         """Adds the oracle's label, the probabilities of actions by its look-ahead from the true state."""
-        costs = self._expert.costs(experience.maze, experience.goal, experience.pose, experience.velocity)
+        truth = experience.maze, experience.goal, experience.pose, experience.velocity
+        costs = self._expert.costs(*truth, experience.step, experience.doors)
         weights = np.exp(-(costs - costs.min(axis=1, keepdims=True)) / self._config.label_temperature)
         label = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
         return Seen(experience.notes.shared, (*experience.notes.parts, label))

@@ -27,6 +27,7 @@ _SLOW = 0.3  # m/s, at which a body counts as waiting
 
 _PACES = (0.6, 0.85, 1.0, 1.15)  # of the usual one, for which ways are tried
 _MOST_TRIES = 8
+_LONGEST_WAIT = 600  # steps
 _NEVER = 1e6  # steps, by which a drive with a wait is worse for who does not wait
 
 
@@ -127,15 +128,13 @@ class DoorDrive:
                     return
             self._wait(point, _REST if not is_slow else 1)
             return
-        for delay in range(1, 600):
-            if self._conflict([*[point] * delay, *points], delay + len(points), doors, delay) is None:
+        for delay in range(1, _LONGEST_WAIT):
+            late = self._conflict([*[point] * delay, *points], delay + len(points), doors, delay)
+            if late is None or late[0] != door:
                 break
-        if delay % 2 == 0:
-            self._wait(point, delay)
-            self._actions += actions
-            self._points += [*points]
-        else:  # after a single turn it plans anew
-            self._wait(point, delay)
+        else:
+            delay = _REST
+        self._wait(point, delay)  # and plans anew
 
     def _wait(self, point: Point, steps: int) -> None:
         """Turns to and fro for some steps."""

@@ -57,10 +57,11 @@ def earliest_way(
     pace: float = 1.0,
     *,
     waits: bool = True,
-) -> tuple[list[Cell], float, float]:
-    """Returns the cells of the way by which a body arrives first, its arrival, and the steps that it waits.
+) -> tuple[list[Cell], float, int]:
+    """Returns the cells of the way by which a body arrives first, its arrival, and the place of its first wait.
 
-    The way is empty, and the arrival infinite, where none leads to the goal.
+    The place is the index of the cell before a door that it waits for; that of the last cell if it does not wait. The
+    way is empty, and the arrival infinite, where none leads to the goal.
 
     Args:
       walls: `[N, N]` bool, with all doors that move open.
@@ -77,11 +78,13 @@ def earliest_way(
         walls, doors.door, doors.is_open, doors.times, doors.hold, start, step + _STEPS_FROM_REST, pace, waits
     )
     if not np.isfinite(arrival[goal]):
-        return [], math.inf, 0.0
+        return [], math.inf, 0
     way = [goal]
     while way[-1] != start:
         way.append(divmod(int(before[way[-1]]), len(walls)))
-    return way[::-1], float(arrival[goal]), float(sum(waited[cell] for cell in way))
+    way.reverse()
+    place = next((index for index, cell in enumerate(way[1:]) if waited[cell] > 0), len(way) - 1)
+    return way, float(arrival[goal]), place
 
 
 @compiled

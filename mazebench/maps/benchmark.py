@@ -1,9 +1,8 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
 There are five: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
-train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`, and `tracks-doors` episodes of the track `doors` in
-its mazes. `real` has real buildings, which
-`mazebench.maps.real_buildings` reads.
+train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`, and `tracks-doors` episodes of the
+track `doors` in its mazes. `real` has real buildings, which `mazebench.maps.real_buildings` reads.
 """
 
 from __future__ import annotations
