@@ -48,7 +48,7 @@ class Passages:
         self.has_changed = False  # whether it saw any passage change
         self._step = 0
         self._evidence = memory.evidence.copy()  # after the last step
-        self._free, self._wall = memory.evidence <= -SURE, memory.evidence >= SURE  # by what was seen last
+        self.free, self.wall = memory.evidence <= -SURE, memory.evidence >= SURE  # by what was seen last
         # The steps at which a cell was first seen as a wall, and last seen.
         self._closed, self._seen = np.zeros((2, *memory.evidence.shape), dtype=np.int64)
 
@@ -57,9 +57,9 @@ class Passages:
         evidence = memory.evidence
         free, wall = evidence <= -SURE, evidence >= SURE
         self._step += 1
-        self.has_changed = self.has_changed or bool((self._free & wall).any() or (self._wall & free).any())
-        self._closed[wall & ~self._wall] = self._step
-        self._free, self._wall = (self._free | free) & ~wall, (self._wall | wall) & ~free
+        self.has_changed = self.has_changed or bool((self.free & wall).any() or (self.wall & free).any())
+        self._closed[wall & ~self.wall] = self._step
+        self.free, self.wall = (self.free | free) & ~wall, (self.wall | wall) & ~free
 
         # What is seen changes the evidence, unless that is at its limit, as of what is near.
         row, column = memory.cell

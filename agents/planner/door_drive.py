@@ -63,7 +63,7 @@ class DoorDrive:
         if policy is Policy.WAITS:  # it takes the way that the map shows
             never = np.array([FOREVER, 1, FOREVER])
             self._doors = self._doors._replace(times=np.broadcast_to(never, self._doors.times.shape).copy())
-        self._boxes = np.array([self._box(number) for number in self._doors.numbers]).reshape(-1, 4)
+        self._boxes = np.array([schedule.box(number) for number in self._doors.numbers.tolist()]).reshape(-1, 4)
         self._courses: dict[tuple[Cell, tuple[int, ...]], Course] = {}
         self._step, self._moved = 0, 0  # the time, and the set of doors that have moved
         self._goal: Cell | None = None
@@ -77,7 +77,7 @@ class DoorDrive:
     def act(self, point: Point, yaw: float, goal: Cell) -> int:
         """Returns the next action of a body at a point (x, y; m) with a heading (rad), to a goal cell."""
         if self._step:
-            self._moved = self._schedule.moved_after(self._step, self._moved, self._cell(point))
+            self._moved = self._schedule.moved_after(self._step, self._moved, point)
         if goal != self._goal:
             self._goal, self._actions = goal, []
         if (
@@ -202,7 +202,7 @@ class DoorDrive:
             touches = np.flatnonzero(far_x * far_x + far_y * far_y < near * near)
             now = moved_doors
             if self._policy is not Policy.WAITS:
-                moved_doors = self._schedule.moved_after(self._step + ahead + 1, moved_doors, self._cell(point))
+                moved_doors = self._schedule.moved_after(self._step + ahead + 1, moved_doors, point)
             for index in set(doors) & set(touches.tolist()) if ahead >= delay else ():
                 if self._is_closed(index, now) or self._is_closed(index, moved_doors):
                     return index, ahead
@@ -219,8 +219,3 @@ class DoorDrive:
 
     def _cell(self, point: Point) -> Cell:
         return cell_of_point(point[0] / self._cell_size, point[1] / self._cell_size, len(self._walls))
-
-    def _box(self, number: int) -> tuple[float, float, float, float]:
-        """Returns left, low, right and high side of a door in metres."""
-        door, size, side = self._schedule.doors[number], len(self._walls), self._cell_size
-        return door.left * side, (size - door.bottom) * side, door.right * side, (size - door.top) * side

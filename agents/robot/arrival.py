@@ -17,6 +17,7 @@ from mazebench.maps.maze import Cell
 from mazebench.tasks.schedule import Schedule
 
 _STEPS_PER_METRE, _STEPS_FROM_REST = 2.05, 3.0  # of the oracle's drives on the dev mazes, along ways with diagonals
+_SURELY = 0.3  # m more than the margin before a door's middle, at which it surely waits for the body
 _DIAGONAL = math.sqrt(2.0)
 
 
@@ -43,7 +44,7 @@ class MovingDoors(NamedTuple):
             np.array(numbers),
             np.array(is_open, dtype=bool),
             np.array(times).reshape(-1, 3),
-            schedule.margin - 0.5,
+            (schedule.margin + _SURELY) / schedule.cell_size,
         )
 
 

@@ -14,7 +14,7 @@ from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.moving_doors import moving_doors
 from mazebench.tasks.perturbations.moving_doors import doors_on_way
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
-from mazebench.tasks.schedule import Schedule, braking_cells
+from mazebench.tasks.schedule import Schedule, braking_way
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -67,7 +67,7 @@ def schedule_of(task: Task, episode: Episode) -> Schedule | None:
     maze = task.mazes[episode.maze]
     for perturbation, rng in perturbations_of(task, episode, Of.DOORS):
         times = perturbation.times(maze, (episode.start, *goals_of(task, episode)), rng)
-        return Schedule(moving_doors(maze), times, braking_cells(task.body, maze.cell_size))
+        return Schedule(moving_doors(maze), times, braking_way(task.body), maze.size, maze.cell_size)
     return None
 
 

@@ -101,6 +101,7 @@ class Rules:
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._noise: list[Noise] = [self._sensors.begin(None)] * num_envs
         self._standing: dict[int, list[Standing]] = {}  # of the episodes in which the building changes
+        self._keepers: dict[int, DoorKeeper] = {}  # of the episodes in which doors move
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
         texts = "", task.options.track or ""
         self.kind, self.track = (np.full(num_envs, text, dtype=object).view(Names) for text in texts)
@@ -135,6 +136,7 @@ class Rules:
         self.is_first[i] = self.reached[i] = self.timed_out[i] = self.goal_reached[i] = False
         self._state_errors[i], self._noise[i] = [], self._sensors.begin(episode)
         self._standing.pop(i, None)
+        self._keepers.pop(i, None)
         if episode is None:
             return
 
@@ -147,7 +149,7 @@ class Rules:
         if standing := [change for change in changes if change is not None]:
             self._standing[i] = standing
         if (schedule := schedule_of(task, episode)) is not None:
-            self._standing[i] = [*standing, DoorKeeper(schedule, len(task.mazes))]
+            self._keepers[i] = DoorKeeper(schedule, len(task.mazes))
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
         self.level[i] = 0 if task.options.track is None else episode_level(task, episode)
@@ -188,7 +190,7 @@ class Rules:
         Returns the environments in which another maze stands from now on.
         """
         self._move(poses, running)
-        return self._change(running) if self._standing else []
+        return self._change(running) if self._standing or self._keepers else []
 
     def _move(self, poses: np.ndarray, running: np.ndarray) -> None:
         """Takes note of where the bodies are, and of what that led to."""
@@ -262,28 +264,29 @@ class Rules:
 
     def _change(self, running: np.ndarray) -> list[int]:
         """Exchanges the mazes of buildings that change now, and measures the ways in them; returns where."""
-        changed = []
-        runs, steps, cells, mazes = (each.tolist() for each in (running, self.steps, self.cell, self.maze))
+        before = self.maze.copy()
         for i, standing in self._standing.items():
-            if not runs[i]:
-                continue
-            maze = mazes[i]
-            for stands in standing:
-                maze = stands(steps[i], maze, divmod(cells[i], self.task.size))
-            if maze == mazes[i]:
-                continue
-            changed.append(i)
-            self.maze[i] = maze
-            built, before = (self.task.standing[number].as_built for number in (maze, mazes[i]))
-            if built is not before and self._ways[i] is not None and (route := self.routes[i]) is not None:
+            for stands in standing if running[i] else ():
+                cell = divmod(self.cell.item(i), self.task.size)
+                self.maze[i] = stands(self.steps.item(i), self.maze.item(i), cell)
+        if self._keepers:
+            runs, steps, mazes, points = (each.tolist() for each in (running, self.steps, self.maze, self.pose[:, :2]))
+            for i, keeper in self._keepers.items():
+                if runs[i] and (maze := keeper.after(steps[i], mazes[i], points[i])) != mazes[i]:
+                    self.maze[i] = maze
+
+        changed = np.flatnonzero(self.maze != before).tolist()
+        for i in changed:
+            built, last = (self.task.standing[number].as_built for number in (self.maze.item(i), before.item(i)))
+            if built is not last and self._ways[i] is not None and (route := self.routes[i]) is not None:
                 self._ways[i] = ways = built.distances(route.goal).ravel()
-                self.way_left[i] = ways[cells[i]]
-        return sorted(changed)
+                self.way_left[i] = ways[self.cell[i]]
+        return changed
 
     def schedules(self) -> list[Schedule | None]:
         """Returns the schedule of the doors in each environment; None where none moves."""
-        keepers = [self._standing.get(i, [None])[-1] for i in range(len(self.maze))]
-        return [keeper.schedule if isinstance(keeper, DoorKeeper) else None for keeper in keepers]
+        keepers = map(self._keepers.get, range(len(self.maze)))
+        return [None if keeper is None else keeper.schedule for keeper in keepers]
 
     def rewards(self) -> np.ndarray:
         """Returns the rewards `[B]` float32 of the last step."""

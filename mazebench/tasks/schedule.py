@@ -13,9 +13,10 @@ import math
 from collections.abc import Sequence
 
 from mazebench.constants import STEP_TIME
-from mazebench.maps.maze import Cell
 from mazebench.maps.moving_doors import Door
 from mazebench.world.bodies import Body
+
+Point = tuple[float, float]
 
 FOREVER = 2**30  # agent steps
 _AHEAD = 1024  # steps whose events are listed at once
@@ -38,13 +39,15 @@ class DoorTimes:
 class Schedule:
     """The doors that move in an episode, with their times.
 
-    A door that is due to close stays open as long as the body is nearer than `margin` cells: it never closes on the
-    body, nor within its braking way.
+    A door that is due to close stays open as long as the body is nearer than `margin`: it never closes on the body, nor
+    within its braking way.
     """
 
     doors: tuple[Door, ...]  # all of the building's that can move
     times: dict[int, DoorTimes]  # by the number of the door, of those that move
-    margin: int  # cells
+    margin: float  # m, from the body's centre
+    size: int  # N, cells a side of the maze
+    cell_size: float  # m
     _parts: dict[int, tuple[list[int], list[int]]] = dataclasses.field(default_factory=dict, init=False, repr=False)
 
     def due(self, step: int) -> tuple[int, int]:
@@ -55,15 +58,25 @@ class Schedule:
         index = bisect.bisect_right(steps, step)
         return sets[index - 1], steps[index]
 
-    def moved_after(self, step: int, moved: int, cell: Cell) -> int:
-        """Returns the set of moved doors after a step that left the body in `cell`, from the set before it."""
+    def moved_after(self, step: int, moved: int, point: Point) -> int:
+        """Returns the set of moved doors after a step that left the body at a point (x, y; m), from the set before."""
         due, _ = self.due(step)
         for number in self.times if due != moved else ():
             door, moves = self.doors[number], (due ^ moved) >> number & 1
             closes = moves and bool(due >> number & 1) == door.is_open
-            if closes and cells_from(door, cell) < self.margin:
+            if closes and self.distance(number, point) < self.margin:
                 due ^= 1 << number
         return due
+
+    def box(self, number: int) -> tuple[float, float, float, float]:
+        """Returns left, low, right and high side of a door in metres."""
+        door, side = self.doors[number], self.cell_size
+        return door.left * side, (self.size - door.bottom) * side, door.right * side, (self.size - door.top) * side
+
+    def distance(self, number: int, point: Point) -> float:
+        """Returns the metres from a door to a point (x, y); 0 in the door."""
+        (left, low, right, high), (x, y) = self.box(number), point
+        return math.hypot(max(left - x, x - right, 0.0), max(low - y, y - high, 0.0))
 
     def _events(self, part: int) -> tuple[list[int], list[int]]:
         """Returns the steps of a part of the time at which something is due, and the sets from then on."""
@@ -92,12 +105,13 @@ class DoorKeeper:
     num_mazes: int
     _settled: tuple[int, int, int] = (0, 0, -1)  # steps from, before, and a maze that then stays: nothing is due
 
-    def __call__(self, step: int, maze: int, cell: Cell) -> int:
+    def after(self, step: int, maze: int, point: Point) -> int:
+        """Returns the maze that stands after a step that left the body at a point (x, y; m), from that before."""
         first, end, settled = self._settled
         if maze == settled and first <= step < end:
             return maze
         moved, building = divmod(maze, self.num_mazes)
-        moved = self.schedule.moved_after(step, moved, cell)
+        moved = self.schedule.moved_after(step, moved, point)
         due, end = self.schedule.due(step)
         stands = building + self.num_mazes * moved
         if moved == due:
@@ -105,23 +119,16 @@ class DoorKeeper:
         return stands
 
 
-def cells_from(door: Door, cell: Cell) -> int:
-    """Returns how many cells a cell is away from a door, along the axis on which it is farther; 0 in the door."""
-    (row, column), (top, left, bottom, right, _) = cell, door
-    return max(top - row, row - bottom + 1, left - column, column - right + 1, 0)
+def braking_way(body: Body) -> float:
+    """Returns the metres from a body's centre within which it may touch something, by a step and by coasting then."""
+    return body.reach + body.fastest * (STEP_TIME + body.coasting_time)
 
 
-def braking_cells(body: Body, cell_size: float) -> int:
-    """Returns the least number of cells from a body to a door that it does not reach in a step and by coasting then."""
-    way = body.reach + body.fastest * (STEP_TIME + body.coasting_time)
-    return math.ceil(way / cell_size) + 1  # it may stand at the near end of its cell
-
-
-def moved_along(schedule: Schedule, cells: Sequence[Cell]) -> list[int]:
-    """Returns the sets of moved doors at each moment of a drive, whose first cell is that of the start."""
+def moved_along(schedule: Schedule, points: Sequence[Point]) -> list[int]:
+    """Returns the sets of moved doors at each moment of a drive, from its points (x, y; m), the first at the start."""
     moved = [0]
-    for step, cell in enumerate(cells[1:], 1):
-        moved.append(schedule.moved_after(step, moved[-1], cell))
+    for step, point in enumerate(points[1:], 1):
+        moved.append(schedule.moved_after(step, moved[-1], point))
     return moved
 
 

@@ -23,9 +23,9 @@ _LEAST_DETOUR = 6.0  # m by which the way around it is longer, if the building h
 # Steps that doors which open again stay closed, and rest open; of the one on the way, at least and at most so many.
 _STAYS, _RESTS = (20, 81), (60, 161)
 _SHORTEST, _LONGEST_WAIT = 12, 120
-_EARLY, _NEAR = (5.0, 12.0), (4.0, 6.0)  # steps before a body comes, after which a door closes for ever, and for a time
+_EARLY, _NEAR = (5.0, 12.0), (3.0, 5.5)  # steps before a body comes, after which a door closes for ever, and for a time
 _FASTEST = 0.85  # of the usual steps, in which a body comes at the earliest
-_WAITS = (0.0, 1.0)  # of the steps that the way around costs, in which a door opens after a body has come
+_WAITS = (0.0, 1.5)  # of the steps that the way around costs, in which a door opens after a body has come
 _OTHERS = 2  # doors that move besides that on the way, at levels 1 and 2
 _TICK = 16  # steps, of whose multiples level 3 makes its times
 
