@@ -1,4 +1,4 @@
-"""Fits how long the navigator expects closed passages to stay so, on train episodes: `python -m benchmarks.fit_waiting`.
+"""Fits how long closed passages stay so for the navigator, on train episodes: `python -m benchmarks.fit_waiting`.
 
 It drives without waiting through episodes of the three levels of `doors` in the mazes of `train`. Of each passage that
 it sees close, the schedule tells whether that opens again and when. The estimates are those of greatest likelihood.

@@ -20,10 +20,11 @@ from mazebench.maps.maze import Maze
 from mazebench.maps.moving_doors import ChangingMazes, MovedMaze, is_joined, moved_walls, moving_doors
 from mazebench.tasks.episode import Episode, sample_episode, schedule_of
 from mazebench.tasks.perturbations.moving_doors import MovingDoors, doors_on_way
-from mazebench.tasks.schedule import DoorTimes, Schedule, cells_from, moved_along, schedules_hash
+from mazebench.tasks.schedule import DoorTimes, Schedule, braking_way, moved_along, schedules_hash
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import LEVELS
 from mazebench.tasks.trials import Trial, select_trials
+from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import VARIED, look_of
 
 # Two rooms side by side, with a door in the row of start and goal and one far below.
@@ -85,7 +86,8 @@ class TestSchedule:
     def schedule(self, **times: DoorTimes) -> Schedule:
         maze = two_rooms()
         cells = {"near": NEAR, "far": FAR}
-        return Schedule(moving_doors(maze), {number_of(maze, cells[name]): each for name, each in times.items()}, 3)
+        by_number = {number_of(maze, cells[name]): each for name, each in times.items()}
+        return Schedule(moving_doors(maze), by_number, braking_way(SLIDER), maze.size, maze.cell_size)
 
     def test_a_door_is_due_in_each_of_its_periods(self):
         schedule = self.schedule(near=DoorTimes(10, 5, 20), far=DoorTimes(12))
@@ -98,8 +100,8 @@ class TestSchedule:
 
     def test_a_door_waits_for_the_body_to_leave_and_opens_in_time(self):
         schedule = self.schedule(near=DoorTimes(2, 6))
-        cells = [(3, 4), (3, 4), (3, 5), (3, 6), (3, 8), (3, 9), (3, 9), (3, 9), (3, 9)]
-        assert [bool(moved) for moved in moved_along(schedule, cells)] == [False] * 5 + [True] * 3 + [False]
+        points = [(x, 9.5) for x in (4.0, 4.5, 5.0, 5.5, 7.5, 8.2, 8.3, 9.0, 9.0)]  # the door is from 6 to 7
+        assert [bool(moved) for moved in moved_along(schedule, points)] == [False] * 6 + [True] * 2 + [False]
 
     @pytest.mark.parametrize("level", LEVELS)
     def test_the_building_stays_passable_and_the_map_is_right_at_first(self, level):
@@ -109,7 +111,7 @@ class TestSchedule:
             assert schedule.due(0)[0] == 0
             assert doors_on_way(maze, episode.start, episode.goal)[1]
             ends = [
-                cells_from(schedule.doors[number], cell)
+                schedule.distance(number, tuple(maze.point(cell).tolist()))
                 for number in schedule.times
                 for cell in (episode.start, episode.goal)
             ]
@@ -194,7 +196,7 @@ class TestEnvironments:
                 walls = task.standing[envs.rules.maze[i]].walls
                 for number, door in enumerate(schedules[i].doors):
                     if moved >> number & 1 and walls[door.cells()].all():
-                        assert cells_from(door, divmod(envs.rules.cell[i], task.size)) >= 3
+                        assert schedules[i].distance(number, envs.rules.pose[i, :2].tolist()) >= 1.2
             assert not any(
                 task.standing[maze].walls.flat[cell]
                 for maze, cell in zip(envs.rules.maze, envs.rules.cell, strict=True)

@@ -23,6 +23,9 @@ OPENS = 0.8  # share of the closed passages that open again
 STAYS = 40.0  # steps, the mean time for which these stay closed
 _STEPS_PER_METRE = 2.05  # of the navigator's drives
 _FREE_ON_MAP = 0.5  # probability of a wall by the map, up to which a wall may be a closed passage
+_FREE = (
+    -4.0
+)  # log odds of a wall, up to which a cell counts as free for a change; no change is seen where nothing moves
 _NEAR = 2.0  # m, within which a robot sees what it has seen before
 _LONGEST = 1e3  # steps, of a cost
 
@@ -48,14 +51,14 @@ class Passages:
         self.has_changed = False  # whether it saw any passage change
         self._step = 0
         self._evidence = memory.evidence.copy()  # after the last step
-        self.free, self.wall = memory.evidence <= -SURE, memory.evidence >= SURE  # by what was seen last
+        self.free, self.wall = memory.evidence <= _FREE, memory.evidence >= SURE  # by what was seen last
         # The steps at which a cell was first seen as a wall, and last seen.
         self._closed, self._seen = np.zeros((2, *memory.evidence.shape), dtype=np.int64)
 
     def update(self, memory: Memory) -> None:
         """Takes note of what is seen now."""
         evidence = memory.evidence
-        free, wall = evidence <= -SURE, evidence >= SURE
+        free, wall = evidence <= _FREE, evidence >= SURE
         self._step += 1
         self.has_changed = self.has_changed or bool((self.free & wall).any() or (self.wall & free).any())
         self._closed[wall & ~self.wall] = self._step

@@ -244,10 +244,10 @@ def to_record(plan: Plan, result: Result) -> Record:
         **task.options.perturbations,
         # Summaries report the episodes of each of these groups apart.
         "blocked": result.blocked if is_track else None,
-        "after_miss": result.after_miss is not None if len(trial.legs) > 1 else None,
-        "kind": (maze.kind or None) if is_track else None,
         "waited": result.waited if schedule is not None else None,
         "doors": None if schedule is None else schedule.rows(),
+        "after_miss": result.after_miss is not None if len(trial.legs) > 1 else None,
+        "kind": (maze.kind or None) if is_track else None,
     }
     told = {name: value for name, value in optional.items() if value is not None}
     return Record.model_validate(values | told | dict(result.reported))

@@ -124,12 +124,15 @@ def braking_way(body: Body) -> float:
     return body.reach + body.fastest * (STEP_TIME + body.coasting_time)
 
 
-def moved_along(schedule: Schedule, points: Sequence[Point]) -> list[int]:
-    """Returns the sets of moved doors at each moment of a drive, from its points (x, y; m), the first at the start."""
-    moved = [0]
-    for step, point in enumerate(points[1:], 1):
-        moved.append(schedule.moved_after(step, moved[-1], point))
-    return moved
+def moved_along(schedule: Schedule, points: Sequence[Point], step: int = 0, moved: int = 0) -> list[int]:
+    """Returns the sets of moved doors at each moment of a drive from its points (x, y; m).
+
+    The first point is that after `step`, when the set `moved` has moved: by default that of an episode's start.
+    """
+    sets = [moved]
+    for now, point in enumerate(points[1:], step + 1):
+        sets.append(schedule.moved_after(now, sets[-1], point))
+    return sets
 
 
 def schedules_hash(schedules: Sequence[Schedule]) -> str:
