@@ -55,21 +55,24 @@ class ImitationLearner(RolloutLearner):
         super().__init__(actor, seed)
         self.num_kept, self.drive_steps = actor.config.kept_rollouts, actor.config.drive_steps
         self.num_ahead = 0 if self.drive_steps else 1  # no step of a drive that is cut goes with those of another one
-        self._expert = Expert(task.mazes, actor.config.num_envs, task.body)
+        self._expert = Expert(task.standing, actor.config.num_envs, task.body)
 
     def driven(self, scene: Scene, actions: np.ndarray) -> np.ndarray:
         """Returns the oracle's actions, some of them random, in the first environments, and the actor's in the rest."""
         num_driven = round(self._config.oracle_drives * len(actions))
         if not num_driven:
             return actions
-        best = self._expert.costs(scene.maze, scene.goal, scene.pose, scene.velocity)[:num_driven].argmin(axis=1)
+        best = self._expert.costs(scene.maze, scene.goal, scene.pose, scene.velocity, scene.step, scene.doors)[
+            :num_driven
+        ].argmin(axis=1)
         at_random = self.rng.random(num_driven) < self._config.random_actions
         best = np.where(at_random, self.rng.integers(NUM_ACTIONS, size=num_driven), best)
         return np.concatenate([best, actions[num_driven:]])
 
     def seen(self, experience: Experience) -> Seen:
         """Adds the oracle's label, the probabilities of actions by its look-ahead from the true state."""
-        costs = self._expert.costs(experience.maze, experience.goal, experience.pose, experience.velocity)
+        truth = experience.maze, experience.goal, experience.pose, experience.velocity
+        costs = self._expert.costs(*truth, experience.step, experience.doors)
         weights = np.exp(-(costs - costs.min(axis=1, keepdims=True)) / self._config.label_temperature)
         label = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
         return Seen(experience.notes.shared, (*experience.notes.parts, label))

@@ -26,7 +26,7 @@ from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.task_options import TaskOptions
-from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS
+from mazebench.tasks.tracks import DISTANCES, LEVELS, STANDING
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
 KINDS = {"train": KNOWN, DEV: KNOWN, "eval": (*KNOWN, *NOVEL)}  # by split
@@ -54,7 +54,7 @@ def freeze_kinds(
             files[episodes_file("local", KINDS_SIZE, split)] = format_trials(_task("building", 1, mazes), trials)
             generator["contexts_sha256"][split] = {
                 f"{track}-{level}": contexts_hash(track, level, mazes, trials)
-                for track, level in itertools.product(TRACKS, LEVELS)
+                for track, level in itertools.product(STANDING, LEVELS)
             }
     write_benchmark(folder, TRACKS_BENCHMARK, generator, files)
 

@@ -47,7 +47,7 @@ from mazebench.tasks.sensors.cameras import as_colors
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import resolve
 from mazebench.tasks.task_options import TaskOptions
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import LEVELS, STANDING, TRACKS
 from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import PLAIN, VARIED, Camera, exposures_of
 from mazebench.world.ray_camera import RayCamera
@@ -173,7 +173,7 @@ def draw_tracks() -> None:
     """Draws a row for each track: the maze with the oracle's path, and the map that is shown at each level."""
     figure = Figure(figsize=(9.6, 10.2), layout="constrained")
     maze = load_kind_mazes("train")[HOUSE]
-    for row, track in zip(figure.subplots(len(TRACKS), 1 + len(LEVELS)), TRACKS, strict=True):
+    for row, track in zip(figure.subplots(len(STANDING), 1 + len(LEVELS)), STANDING, strict=True):
         for level in LEVELS:
             played = play(maze, split="train", task=track, level=level, distances=DISTANCE)
             _show(row[level], _shown_map(played.shown), f"{track} {level}", 13, extent=2 * (0, maze.size))

@@ -28,6 +28,7 @@ class Truth(NamedTuple):
     walls: np.ndarray  # [B, N, N] bool, the true maze
     pose: np.ndarray  # [B, 3] float64, x and y (m) and yaw (rad)
     goal: np.ndarray  # [B, 2] int, the present goal's cell (row, column)
+    doors: Sequence[Any] | None = None  # B of `mazebench.tasks.schedule.Schedule`, where doors move; else None
 
 
 class Inputs(NamedTuple):
@@ -239,7 +240,7 @@ class _SingleAgents(Agent):
         agent = state[slot]
         agent.seed, agent.new_episode = int(inputs.seed[slot]), bool(inputs.new_episode[slot])
         if inputs.truth is not None:
-            agent.truth = Truth(*(values[slot] for values in inputs.truth))
+            agent.truth = Truth(*(None if values is None else values[slot] for values in inputs.truth))
         if inputs.new_context[slot]:
             agent.reset(observation)
         return agent.act(observation)

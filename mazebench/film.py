@@ -187,7 +187,7 @@ class _Scene:
         self._path: list[np.ndarray] = []  # [2] m each
         self.record_position()
         names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.options.sensors)
-        self._cameras = Cameras(self._task.mazes, names, self.pixels, self._task.body) if names else None
+        self._cameras = Cameras(self._task.standing, names, self.pixels, self._task.body) if names else None
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""
@@ -200,7 +200,7 @@ class _Scene:
         """
         pictures, rules = {}, self.envs.rules
         if self._cameras is not None:
-            pictures = self._cameras.take(self.episode.maze, rules.pose[0], rules.marker[0])
+            pictures = self._cameras.take(rules.maze.item(), rules.pose[0], rules.marker[0])
         for view in set(self.views) - pictures.keys():
             if view == MAP:
                 picture = self._map()
@@ -228,7 +228,7 @@ class _Scene:
 
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
         """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
-        walls, pose = self._task.mazes[self.episode.maze].walls, self.envs.rules.pose[0]
+        walls, pose = self._task.standing[self.envs.rules.maze.item()].walls, self.envs.rules.pose[0]
         cell_pixels = self._cell_pixels(walls)
         picture = draw_grid(walls, cell_pixels, self.episode.start, self.episode.goal, self._to_cells(self._path))
         sensor = ahead_of(pose, self._task.body.lidar_offset)

@@ -61,11 +61,12 @@ def rollout(
         truth = None
         if needs_truth:  # where an environment rests, it is a maze without a goal
             mazes = np.where(envs.rules.active, envs.rules.maze, 0).tolist()
-            walls = np.stack([envs.task.mazes[maze].walls for maze in mazes])
+            walls = np.stack([envs.task.standing[maze].walls for maze in mazes])
             pose = np.column_stack([info["position"], info["yaw"]]).astype(np.float64)
             routes = zip(envs.episodes, envs.rules.routes, strict=True)
             goals = [route.goal if episode and route else (0, 0) for episode, route in routes]
-            truth = Truth(walls, pose, np.array(goals, dtype=np.int64))
+            doors = envs.rules.schedules() if envs.task.arena.moves_doors else None
+            truth = Truth(walls, pose, np.array(goals, dtype=np.int64), doors)
         inputs = Inputs(observation, new_episode, info["is_first"], seed, truth, active)
 
         # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.

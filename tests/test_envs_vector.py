@@ -329,7 +329,9 @@ class TestSeveralTracks:
 
     @pytest.mark.parametrize("tracks", [(), ("building", "local"), ("building", "building")], ids=str)
     def test_others_than_different_tracks_are_refused(self, tracks):
-        with pytest.raises(InputError, match="expected different tracks of building, rebuilt, adrift, rough, found"):
+        with pytest.raises(
+            InputError, match="expected different tracks of building, rebuilt, adrift, rough, doors, found"
+        ):
             mazebench.make_vec(tracks)
 
 

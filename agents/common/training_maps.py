@@ -24,7 +24,7 @@ class TrainingMaps:
     """The maps of a task's mazes; a symmetry of 0 leaves them as they are. `G` is the number of a sample's groups."""
 
     def __init__(self, task: Task):
-        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.mazes[maze].walls))
+        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.standing[maze].walls))
         self.size = task.size  # N
         self._context_size = task.context_size  # M
 

@@ -24,7 +24,7 @@ class CloningLearner(ImitationLearner):
     def __init__(self, actor: ImitatingAgent, task: Task, seed: int):
         """The pictures are of the mazes of `task`."""
         super().__init__(actor, task, seed)
-        self._cameras = {look: RayCamera(task.mazes, Camera(), look) for look in LOOKS}
+        self._cameras = {look: RayCamera(task.standing, Camera(), look) for look in LOOKS}
 
     def seen(self, experience: Experience) -> Seen:
         """Adds mazes and true poses to what the actor noted, and the oracle's labels."""

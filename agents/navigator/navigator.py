@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import pathlib
 from typing import ClassVar, Self
 
@@ -15,6 +16,7 @@ from ..robot.facing import TurningDrive
 from ..robot.moving_body import PLAYED, as_kind, has_all_six
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, range_sensor, report
+from .passages import Passages
 
 
 @dataclasses.dataclass
@@ -22,6 +24,7 @@ class Robot:
     """The robot in one environment: what it knows, and the drive that is under way."""
 
     memory: Memory
+    passages: Passages | None = None  # where it may wait for some to open
     drive: Drive = dataclasses.field(default_factory=Drive)
     turning: TurningDrive = dataclasses.field(init=False)
 
@@ -35,6 +38,7 @@ class Navigator(Agent):
     plays_actions = PLAYED
     senses_class: ClassVar[type[Senses]] = Senses
     read_sensors = staticmethod(range_sensor)
+    waits: ClassVar[bool] = True  # for passages to open, once it has seen one change
 
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""
@@ -68,11 +72,17 @@ class Navigator(Agent):
             if inputs.active is None or inputs.active[slot]:
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
-                    robot = state[slot] = Robot(memory)
+                    robot = state[slot] = Robot(memory, self._passages(memory))
+                elif robot.passages is not None:
+                    robot.passages.update(memory)
 
                 # A path over walls and goal as they are estimated now.
                 walls, goal = self.estimate(memory, inputs, slot)
-                path = plan(walls, goal, memory.cell, self._cell_size) if goal.any() else []
+                closed = None if robot.passages is None else robot.passages.costs(memory)
+                path = plan(walls, goal, memory.cell, self._cell_size, closed) if goal.any() else []
+                if closed is not None:  # as far as the first closed passage
+                    path = list(itertools.takewhile(lambda cell, closed=closed: closed[cell] == np.inf, path))
+                    path = path if len(path) > 1 or goal[memory.cell] else []
 
                 # It drives along the path, and waits where there is none.
                 if self._turns:
@@ -80,6 +90,11 @@ class Navigator(Agent):
                 else:
                     actions[slot] = robot.drive.follow(path, walls, memory, self._strafes)
         return velocities if self._turns else as_kind(self._kind, actions, self._body), state
+
+    def _passages(self, memory: Memory) -> Passages | None:
+        """Returns what a robot sees of passages; None where it does not wait for them, or its pose may be wrong."""
+        knows_pose = memory.tracker is None and memory.dead_reckoning is None
+        return Passages(memory) if self.waits and knows_pose and not self._senses.feels and not self._turns else None
 
     def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns what it plans on, `[L, L]` float twice: the probability of a wall, and weights of the goal."""

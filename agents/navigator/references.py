@@ -1,4 +1,4 @@
-"""Navigators that the metrics refer to: one that is told all walls once blocked, and one without memory."""
+"""Navigators that the metrics refer to: told all walls once blocked, without memory, and without waiting."""
 
 from __future__ import annotations
 
@@ -51,3 +51,9 @@ class NavigatorWithoutMemory(Navigator):
             if robot is not None and inputs.new_context[slot]:
                 state[slot] = Robot(dataclasses.replace(robot.memory))
         return super().act(inputs, state, explore)
+
+
+class NavigatorWithoutWaiting(Navigator):
+    """Drives as the navigator, but takes each wall that it sees for one that stays."""
+
+    waits = False

@@ -22,7 +22,9 @@ _CLOSED = 1e4  # m; what a certain wall costs, longer than any way around
 _UNLIKELY = 1e-9  # of the likeliest goal's probability, up to which a goal is too far to be searched on any map
 
 
-def plan(walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.0) -> list[Cell]:
+def plan(
+    walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.0, waits: np.ndarray | None = None
+) -> list[Cell]:
     """Returns the cells of a cheapest path from `start` to one of the goals.
 
     Args:
@@ -30,7 +32,10 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.
       goal: `[N, N]` float, how likely a cell is the goal, not zero everywhere.
       start: the cell of the body.
       cell_size: m.
+      waits: `[N, N]` float, metres that closed passages cost, infinite elsewhere; None if there are none.
     """
+    if waits is not None:
+        walls = np.where(waits < _CLOSED, 0.0, walls)
     # Outside of the box around what may be free, there is no way.
     top, bottom, left, right = _box(walls, *start)
     walls, goal = walls[top:bottom, left:right], goal[top:bottom, left:right]
@@ -38,6 +43,10 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.
     # Entering a cell costs more the likelier it is a wall.
     free = np.maximum(1 - walls, 1e-9)
     entering = np.where(walls < 1, cell_size + np.maximum(-_RISK * np.log(free), _DETOUR * walls / free), _CLOSED)
+
+    if waits is not None:
+        box = waits[top:bottom, left:right]
+        entering += np.where(box < _CLOSED, box, 0.0)
 
     # Ending in a cell costs more the likelier the goal is elsewhere.
     end = np.full(goal.shape, np.inf)

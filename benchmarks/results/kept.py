@@ -24,7 +24,7 @@ from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_res
 from mazebench.results.suite_groups import group_of
 from mazebench.results.trajectories import TRAJECTORIES
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import LEVELS, STANDING, TRACKS
 from mazebench.training.run_folder import METRICS, checkpoints, read_metrics
 
 PAPER = "paper"  # the suite
@@ -104,7 +104,7 @@ class Kept:
 
     def on_tracks(self, agent: str) -> Iterator[tuple[str, int, pd.DataFrame]]:
         """Yields the tracks and levels on which an agent was evaluated, with its episodes there."""
-        for track, level in itertools.product(TRACKS, LEVELS):
+        for track, level in itertools.product(STANDING, LEVELS):
             if (own := self.find(agent, f"{track}-{level}")) is not None:
                 yield track, level, own
 

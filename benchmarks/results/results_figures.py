@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from benchmarks.results.kept import LOCAL, ON_TIME_125, Kept, estimate
 from mazebench.report.figures import Panel, draw_panels, draw_table
 from mazebench.report.paper_figures import draw_paths, draw_violins
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import LEVELS, STANDING
 
 # Each line's place is its colour and marker, in all figures.
 _LOOKS = (
@@ -71,7 +71,7 @@ def on_time(title: str, lines: Mapping[str, tuple[str, Sequence[bool]]], kept: K
 def budget(kept: Kept) -> Figure:
     """Returns the share of episodes that reach the goal within a budget of steps, at level 2 of each track."""
     panels = []
-    for track in TRACKS:
+    for track in STANDING:
         points = []
         for agent in ("navigator", "navigator without map", "sb3_agent:FieldPPOAgent", "neural-planner"):
             own = kept.of(agent, f"{track}-2")

@@ -39,7 +39,7 @@ from mazebench.report.table import to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.metrics import METRICS, ON_TIMES, RECALLS, SPL, SUCCESS_RATE
 from mazebench.results.suite_groups import WITH_RIGHT_MAP, WITHOUT_MAP
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import LEVELS, STANDING
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
@@ -48,7 +48,7 @@ PAGES = (
     *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
-    *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
+    *(f"docs/environments/{name}.md" for name in (*STANDING, "local", "hierarchical")),
 )
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
@@ -59,7 +59,7 @@ _BLOCK = re.compile(
 )
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
-_TRACKS = [f"`{track}`" for track in TRACKS]
+_TRACKS = [f"`{track}`" for track in STANDING]
 _KINDS = (*KNOWN, *NOVEL)
 _WITHOUT_MEMORY = "navigator-without-memory"
 
@@ -357,7 +357,7 @@ def tracks_headroom(kept: Kept) -> str:
         "dagger:Student",
         "sb3_agent:FieldPPOAgent",
     ):
-        shares: dict[str, list[str]] = {track: [] for track in TRACKS}
+        shares: dict[str, list[str]] = {track: [] for track in STANDING}
         for track, level, own in kept.on_tracks(agent):
             *_, told = ceilings(track, level).values()
             low, high = (
@@ -513,7 +513,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-map-worth": tracks_map_worth,
     "tracks-blocked": tracks_blocked,
     "tracks-recall": tracks_recall,
-    **{f"expected-{track}": functools.partial(expected_on_track, track) for track in TRACKS},
+    **{f"expected-{track}": functools.partial(expected_on_track, track) for track in STANDING},
     "expected-local": lambda kept: by_distance(
         "agent",
         {text: (LOCAL, agent) for agent, text in _EXPECTED_LOCAL.items()},
@@ -553,7 +553,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
 
 def _levels(kept: Kept, agent: str, metric: str, kinds: Sequence[str] = _KINDS) -> list[str]:
     """Returns a metric's means at the levels of each track, as "0.75 / 0.50 / 0.25"; "-" without evaluations."""
-    texts: dict[str, list[str]] = {track: [] for track in TRACKS}
+    texts: dict[str, list[str]] = {track: [] for track in STANDING}
     for track, _, own in kept.on_tracks(agent):
         texts[track].append(_number(own[own.kind.isin(kinds)][metric].mean()))
     return [" / ".join(levels) or "-" for levels in texts.values()]

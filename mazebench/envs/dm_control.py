@@ -164,7 +164,7 @@ class Environment(control.Environment):
         require_task(task)
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
         super().__init__(
-            Physics.of_mazes(models_of(task.mazes, task.body)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION
+            Physics.of_mazes(models_of(task.standing, task.body)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION
         )
 
     @property

@@ -45,7 +45,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.runner = TaskRunner(task, seed, shows_goal=self._shows_goal)
         self.task = task
-        walls = near_walls_of(task.mazes, 1, task.body)
+        walls = near_walls_of(task.standing, 1, task.body)
         self.simulation = MujocoSimulation(walls.model, walls)
         self._needs_reset = True
         self.render_mode = render_mode
@@ -105,7 +105,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         if self.render_mode is None:
             return None
         if self._cameras is None:
-            self._cameras = Cameras(self.task.mazes, (self._camera,), body=self.task.body)
+            self._cameras = Cameras(self.task.standing, (self._camera,), body=self.task.body)
         data = self.simulation.data
         return self._cameras.take(self.runner.rules.maze.item(), data.qpos, data.mocap_pos[0])[self._camera]
 

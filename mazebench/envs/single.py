@@ -122,7 +122,7 @@ class TaskRunner:
         """Returns all that the future of the task and its simulation depends on."""
         changing = {name: value for name, value in vars(self.rules).items() if name not in _NO_STATE}
         return EnvironmentState(
-            maze=self.maze_task.mazes[self.rules.maze.item()],
+            maze=self.maze_task.standing[self.rules.maze.item()].as_built,
             simulation=simulation.full_state(),
             distances=self.maze_task.distances,
             rng=self.rng.bit_generator.state,
@@ -136,7 +136,7 @@ class TaskRunner:
           InputError: if it is of an environment with other mazes.
         """
         index = state.rules["maze"].item()
-        if index >= len(self.maze_task.mazes) or self.maze_task.mazes[index] != state.maze:
+        if not self.maze_task.arena.has(index) or self.maze_task.standing[index].as_built != state.maze:
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
         if state.distances != self.maze_task.distances:
             self.draw_distances(state.distances)

@@ -116,7 +116,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # The simulation, with views of its arrays.
         self._body, self._actions = task.body, Actions(task.actions, task.body)
-        self._walls = near_walls_of(task.mazes, num_envs, task.body)
+        self._walls = near_walls_of(task.standing, num_envs, task.body)
         self._process = os.getpid()
         self._batch = open_batch(self._walls.model, num_envs, arguments.num_threads)
         self._geoms = WallGeoms.of_batch(self._batch)
@@ -317,7 +317,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(self.task.mazes, ("top",), body=self.task.body)
+            self._top_camera = Cameras(self.task.standing, ("top",), body=self.task.body)
         worlds = zip(self.rules.maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 

@@ -24,7 +24,7 @@ from mazebench.results.metrics import spl
 from mazebench.results.records import Count, Length, Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.rollout import agent_seed, rollout
-from mazebench.tasks.episode import Episode
+from mazebench.tasks.episode import Episode, schedule_of
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.task import Task
@@ -47,6 +47,7 @@ class Result(NamedTuple):
     reported: Mapping[str, Any] = {}  # further keys of the record, of what the agent reported
     leg: Count = 1  # of the episode's goals, counted from 1
     after_miss: Cell | None = None  # where the leg began if the goal before was missed
+    waited: Count = 0  # steps in which the body hardly moved
 
 
 class Chunk(NamedTuple):
@@ -86,6 +87,7 @@ class _Slot:
                 reported=recalls(self.hits) | ({} if notes is None else {"notes": notes}),
                 leg=len(self.legs) + 1,
                 after_miss=divmod(self.start, task.size) if has_missed else None,
+                waited=final["waited"].item() - sum(leg.waited for leg in self.legs),
             )
         )
         self.kept, self.hits, self.begun = [], [], driven
@@ -235,7 +237,7 @@ def to_record(plan: Plan, result: Result) -> Record:
         "leg": result.leg,
         "oracle_steps": leg.oracle_steps,
     }
-    is_track = task.options.track is not None
+    is_track, schedule = task.options.track is not None, schedule_of(task, episode)
     optional = {
         "cell_size": None if task.cell_size == 1 else task.cell_size,
         "level": task.options.track_level if is_track else None,
@@ -243,6 +245,8 @@ def to_record(plan: Plan, result: Result) -> Record:
         **task.options.perturbations,
         # Summaries report the episodes of each of these groups apart.
         "blocked": result.blocked if is_track else None,
+        "waited": result.waited if schedule is not None else None,
+        "doors": None if schedule is None else schedule.rows(),
         "after_miss": result.after_miss is not None if len(trial.legs) > 1 else None,
         "kind": (maze.kind or None) if is_track else None,
     }

@@ -30,8 +30,9 @@ from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import pool_of
 from mazebench.results.naming import described, title_of
 from mazebench.storage.files import open_whole, writing_to
-from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.episode import sample_episode, schedule_of
 from mazebench.tasks.rules import reward
+from mazebench.tasks.schedule import moved_along
 from mazebench.tasks.sensors import WITHOUT_SENSORS
 from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.trials import Trial
@@ -191,7 +192,10 @@ def _demonstration(task: Task, trial: Trial, result: Result) -> EpisodeBuffer:
     is_last = np.arange(result.steps) == result.steps - 1
     terminations, truncations = is_last & result.success, is_last & (not result.success)
     pose = np.stack([moment["pose"] for moment in moments])
-    way_left = maze.distances(trial.episode.goal).ravel()[maze.cell_index(pose[:, :2])]
+    privileged = {"pose": pose, "way_left": maze.distances(trial.episode.goal).ravel()[maze.cell_index(pose[:, :2])]}
+    if (schedule := schedule_of(task, trial.episode)) is not None:
+        sets = moved_along(schedule, pose[:, :2].tolist())
+        privileged["moved_doors"] = np.array(sets, dtype=np.int64)
     return EpisodeBuffer(
         seed=result.number,
         options={"maze": maze.name, "distance": trial.distance},
@@ -203,7 +207,7 @@ def _demonstration(task: Task, trial: Trial, result: Result) -> EpisodeBuffer:
         infos={
             "context": np.stack([context for moment in moments for context in moment["context"]]),
             "leg": np.array([moment["leg"] for moment in moments], dtype=np.int32),
-            "privileged": {"pose": pose, "way_left": way_left},
+            "privileged": privileged,
         },
     )
 

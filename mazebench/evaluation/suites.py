@@ -25,10 +25,10 @@ from mazebench.results.records import Summary
 from mazebench.results.suite_groups import OF, WITH_RIGHT_MAP, WITHOUT_MAP, group_of
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT
+from mazebench.tasks.streams import ADRIFT, BUILDING, DOORS, REBUILT
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import TaskOptions
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import LEVELS, STANDING, TRACKS
 from mazebench.tasks.trials import Trial
 from mazebench.world.looks import VARIED
 
@@ -67,7 +67,7 @@ def _in_words(split: str = "eval") -> tuple[Part, ...]:
 
 
 def _each_level(
-    tracks: Iterable[str] = TRACKS, suffix: str = "", split: str = "eval", **options: Any
+    tracks: Iterable[str] = STANDING, suffix: str = "", split: str = "eval", **options: Any
 ) -> tuple[Part, ...]:
     return tuple(
         Part(f"{track}-{level}{suffix}", TaskOptions(task=track, level=(level,), split=split, **options))
@@ -139,6 +139,9 @@ SUITES: dict[str, tuple[Part, ...]] = {
     # Goals in a row on one wrong map; parts have names of their own, since their first goals are played on the tracks.
     "tracks-goals": _each_level((REBUILT,), "-goals", num_goals=3),
     "tracks-goals-dev": _each_level((REBUILT,), "-goals", num_goals=3, split=DEV),
+    # Doors that close and open while one drives.
+    "doors": _each_level((DOORS,)),
+    "doors-dev": _each_level((DOORS,), split=DEV),
     # Frozen real buildings: what old maps and right maps are worth there.
     "real": _in_real_buildings("eval"),
     "real-dev": _in_real_buildings(DEV),

@@ -1,8 +1,8 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
-There are four: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
-train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`. `real` has real buildings, which
-`mazebench.maps.real_buildings` reads.
+There are five: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
+train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`, and `tracks-doors` episodes of the
+track `doors` in its mazes. `real` has real buildings, which `mazebench.maps.real_buildings` reads.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
 PAPER_BENCHMARK, TRACKS_BENCHMARK, GOALS_BENCHMARK, REAL_BENCHMARK = "paper", "tracks", "tracks-goals", "real"
+DOORS_BENCHMARK = "tracks-doors"
 FOLDERS = {  # of the assets
     PAPER_BENCHMARK: "paper_mazes",
     TRACKS_BENCHMARK: "tracks",
     GOALS_BENCHMARK: "tracks_goals",
     REAL_BENCHMARK: "real",
+    DOORS_BENCHMARK: "tracks_doors",
 }
 SIZES = BENCHMARK_SIZES
 KINDS_SIZE = 31

@@ -95,6 +95,11 @@ class Maze:
         return Maze, (self.walls, self.name, self.cell_size, self.kind)  # without what is cached
 
     @property
+    def as_built(self) -> Maze:
+        """The maze before any of its doors moved (`moving_doors.MovedMaze`): itself."""
+        return self
+
+    @property
     def size(self) -> int:
         """The number N of rows and of columns."""
         return self.walls.shape[0]

@@ -70,6 +70,7 @@ function episodeOf(packed, number, index) {
     real,
     ...shownMap(packed, result, index, real),
     ...Object.fromEntries(OF_EPISODES.map((name) => [name, columns[name][index]])),
+    doors: columns.doors ? columns.doors[index] : [],
     landmarks: columns.landmarks ? columns.landmarks[index] : [],
     path: partOf(packed.path, first, poses),
     observed: packed.observed && partOf(packed.observed, first, poses),
@@ -247,9 +248,17 @@ function differs(current) {
   return !current.isDrawn && current.shown && current.real && current.shown.some((wall, cell) => wall !== current.real[cell]);
 }
 
+// The walls at a time, after the doors that have moved until then.
+function wallsAt({ real, doors }, time) {
+  if (!real || !doors.length) return real;
+  const walls = real.slice();
+  for (const [step, ...cells] of doors) if (step <= time) for (const cell of cells) walls[cell] = 1 - walls[cell];
+  return walls;
+}
+
 function draw() {
-  const { current } = view;
   if (view.episode < 0) return;
+  const current = { ...view.current, real: wallsAt(view.current, view.time) };
   const color = colors();
   const ranges = current.lidar && current.path.x.length && byId("lidar").checked ? rangesOf(current.real, current.size, current.path, view.time, current.sensor) : [];
   drawShown(current, color);

@@ -30,12 +30,12 @@ from mazebench.results.reading import SUITE, SUMMARY, Result, find_parts, load_r
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import LEVELS, STANDING
 from mazebench.tasks.trials import frozen_trials
 from mazebench.world.bodies import SLIDER
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
-PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
+PARTS = [f"{track} {level}" for track in STANDING for level in LEVELS]
 LIDAR, CAMERA = "lidar", "camera"
 SUITE_OF = {LIDAR: "tracks", CAMERA: "tracks-camera"}  # by division
 DIVISIONS = {sensors_in_words(SUITES[suite][0].task): division for division, suite in SUITE_OF.items()}  # by sensors

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import itertools
 import json
 import math
 import zlib
@@ -29,6 +30,9 @@ from mazebench.report.table import Table
 from mazebench.results import naming
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
+from mazebench.tasks.episode import Episode, schedule_of
+from mazebench.tasks.schedule import moved_along
+from mazebench.tasks.task import Task
 from mazebench.world.ray_casting import NUM_RAYS
 
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
@@ -187,9 +191,35 @@ def _outcomes(result: ReportedResult) -> dict[str, Any]:
     if trajectories:
         scale = [result.setting.cell_size or 1.0] * 2 + [1.0]
         columns["path"] = _changes(np.concatenate([each.pose for each in trajectories]) / scale)
+        if result.task is not None and result.task.moves_doors:
+            columns["doors"] = _doors(result, result.task, trajectories)
         if trajectories[0].observed is not None:
             columns["observed"] = _changes(np.concatenate([lay_on_first_pose(each) for each in trajectories]) / scale)
     return columns
+
+
+def _doors(result: ReportedResult, task: Task, trajectories: Sequence[Trajectory]) -> list[list[list[int]]]:
+    """Returns for each leg when doors move: the step of the leg, and the cells that are wall then and were not before.
+
+    Or the other way round. What stands when a leg begins is of its step 0.
+    """
+    indices = {maze.name: index for index, maze in enumerate(task.arena.fixed_mazes)}
+    legs = zip(*(result.episodes[name] for name in ("maze", "start", "goal", "seed")), trajectories, strict=True)
+    found, step, moved, schedule = [], 0, 0, None
+    for number, (maze, start, goal, seed, trajectory) in enumerate(legs):
+        if number % task.options.num_goals == 0:
+            schedule, step, moved = schedule_of(task, Episode(indices[maze], start, goal, 0.0, seed)), 0, 0
+        assert schedule is not None
+        sets = moved_along(schedule, trajectory.pose[:, :2].tolist(), step, moved)
+        grid, changes = np.arange(task.size**2).reshape(task.size, -1), []
+        for at, (before, after) in enumerate(itertools.pairwise([0, *sets])):
+            cells = [
+                grid[door.cells()].ravel() for each, door in enumerate(schedule.doors) if (before ^ after) >> each & 1
+            ]
+            changes += [[at, *np.concatenate(cells).tolist()]] if cells else []
+        found.append(changes)
+        step, moved = step + len(sets) - 1, sets[-1]
+    return found
 
 
 def lay_on_first_pose(trajectory: Trajectory) -> np.ndarray:

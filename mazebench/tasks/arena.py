@@ -14,6 +14,7 @@ from mazebench.maps.benchmark import KINDS_SIZE, SIZES, load_kind_mazes, load_ma
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_options import THIN_WALLS
+from mazebench.maps.moving_doors import ChangingMazes, StandingMazes
 from mazebench.maps.older_map import OlderMap
 from mazebench.maps.places import free_cell_of_place
 from mazebench.maps.real_buildings import is_real, load_building, load_older
@@ -41,9 +42,15 @@ class Arena:
     start: str | None = None  # of all episodes, as the option says; None if each draws one
     goal: str | None = None
     has_corners: bool = False  # whether episodes lead from corner to corner where no start or goal is given
+    moves_doors: bool = False  # whether doors close and open while one drives
     # What was found: the farthest goals by maze, and the tracks and levels that all mazes can carry.
     _farthest: dict[int, int] = dataclasses.field(default_factory=dict, init=False, repr=False)
     _carried: set[tuple[str, int]] = dataclasses.field(default_factory=set, init=False, repr=False)
+
+    @functools.cached_property
+    def standing(self) -> StandingMazes:
+        """The mazes by the numbers that say what stands; behind the mazes, those in which doors are closed."""
+        return ChangingMazes(self.mazes) if self.moves_doors else self.mazes
 
     @property
     def size(self) -> int:
@@ -54,6 +61,10 @@ class Arena:
     def cell_size(self) -> float:
         """The width of the cells of all mazes in metres."""
         return self.mazes[0].cell_size
+
+    def has(self, number: int) -> bool:
+        """Returns whether a maze has the number, one of those that can stand."""
+        return self.moves_doors or number < len(self.mazes)
 
     @property
     def fixed_mazes(self) -> tuple[Maze, ...]:
@@ -197,7 +208,8 @@ def pixels_of_track(track: str, size: int) -> int:
 
 
 def _unchecked(asked: TaskOptions, mazes: Mazes, shown: tuple[OlderMap, ...] | None = None) -> Arena:
-    return Arena(mazes, shown, asked.start, asked.goal, asked.is_hierarchical)
+    moves_doors = asked.track is not None and TRACKS[asked.track].moves_doors
+    return Arena(mazes, shown, asked.start, asked.goal, asked.is_hierarchical, moves_doors)
 
 
 def _read(asked: TaskOptions) -> tuple[Mazes, tuple[OlderMap, ...] | None]:

@@ -11,14 +11,17 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
+from mazebench.maps.moving_doors import moving_doors
+from mazebench.tasks.perturbations.moving_doors import doors_on_way
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
+from mazebench.tasks.schedule import Schedule, braking_way
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 _SEEDS = 2**31
 _MAX_TRIES = 1000
-_MAX_REDRAWS = 100  # of a fresh maze, for an episode
+_MAX_REDRAWS = 100  # of a fresh maze, for an episode, and of a pair between which no door closes
 _FIXED_PAIR_SEED = 20210  # of the pairs of the extremely-low-data regime; any number, chosen once
 
 
@@ -57,6 +60,15 @@ def perturbations_of(task: Task, episode: Episode, *things: Of) -> Iterator[tupl
     for perturbation in task.perturbations(episode_level(task, episode)):
         if perturbation.of in things:
             yield perturbation, episode.stream(perturbation.stream)
+
+
+def schedule_of(task: Task, episode: Episode) -> Schedule | None:
+    """Returns the schedule of the doors in an episode; None where none moves."""
+    maze = task.mazes[episode.maze]
+    for perturbation, rng in perturbations_of(task, episode, Of.DOORS):
+        times = perturbation.times(maze, (episode.start, *goals_of(task, episode)), rng)
+        return Schedule(moving_doors(maze), times, braking_way(task.body), maze.size, maze.cell_size)
+    return None
 
 
 def goals_of(task: Task, episode: Episode) -> tuple[Cell, ...]:
@@ -110,7 +122,7 @@ def _sample_episode(task: Task, rng: np.random.Generator) -> Episode:
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if task.options.pairs == "fixed" else rng
         distance = task.distances[pair_rng.integers(len(task.distances))]
-        start, goal = sample_pair(maze, distance, pair_rng, start, goal, task.arena.joined(index))
+        start, goal = sample_pair_of(task, index, distance, pair_rng)
     return make_episode(index, start, goal, rng)
 
 
@@ -118,6 +130,19 @@ def make_episode(maze: int, start: Cell, goal: Cell, rng: np.random.Generator) -
     """Returns the episode from `start` to `goal` in maze number `maze`; draws the first heading and the seed."""
     yaw = float(rng.uniform(-np.pi, np.pi))
     return Episode(maze=maze, start=start, goal=goal, yaw=yaw, seed=int(rng.integers(_SEEDS)))
+
+
+def sample_pair_of(task: Task, index: int, distance: int, rng: np.random.Generator) -> tuple[Cell, Cell]:
+    """Draws a start and a goal in maze number `index` of a task, as `sample_pair` does.
+
+    Where doors move, pairs are drawn until a door on a shortest way between them can close, for some draws.
+    """
+    maze, ends = task.mazes[index], task.arena.ends(index)
+    for _ in range(_MAX_REDRAWS if task.moves_doors else 1):
+        pair = sample_pair(maze, distance, rng, *ends, task.arena.joined(index))
+        if task.moves_doors and doors_on_way(maze, *pair)[1]:
+            break
+    return pair
 
 
 def sample_pair(

@@ -43,7 +43,7 @@ class OpenSensors:
         names: dict[type[Sensor[Any]], list[str]] = {}
         for name in task.options.sensors:
             names.setdefault(SENSORS[name], []).append(name)
-        self._sensors = [kind(tuple(of_kind), task.options, task.mazes) for kind, of_kind in names.items()]
+        self._sensors = [kind(tuple(of_kind), task.options, task.standing) for kind, of_kind in names.items()]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Makes copies open sensors of their own."""

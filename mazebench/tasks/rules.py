@@ -11,10 +11,11 @@ from mazebench.maps.kinds import KINDS
 from mazebench.maps.maze import Cell
 from mazebench.maps.real_buildings import ORIGINS
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode, episode_level, perturbations_of
+from mazebench.tasks.episode import Episode, episode_level, perturbations_of, schedule_of
 from mazebench.tasks.observation import Noise, OpenSensors, state_errors
 from mazebench.tasks.perturbations.perturbation import Of, ShownMap, Standing, StateError
 from mazebench.tasks.route import Event, Route, plan_route
+from mazebench.tasks.schedule import DoorKeeper, Schedule
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import PROGRESS
@@ -22,6 +23,7 @@ from mazebench.tasks.tracks import TRACKS
 from mazebench.world.angles import wrap_angle
 
 _UNKNOWN = -1  # a way that would take long to measure
+_WAITS = 0.05  # m; a step in which the body moves less counts as waited
 _OUT_OF_SIGHT = 1e6  # m, where cameras do not see the goal's disc
 
 
@@ -95,6 +97,7 @@ class Rules:
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._noise: list[Noise] = [self._sensors.begin(None)] * num_envs
         self._standing: dict[int, list[Standing]] = {}  # of the episodes in which the building changes
+        self._keepers: dict[int, DoorKeeper] = {}  # of the episodes in which doors move
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
         texts = "", task.options.track or ""
         self.kind, self.track = (np.full(num_envs, text, dtype=object).view(Names) for text in texts)
@@ -116,7 +119,7 @@ class Rules:
         self.way_left = np.zeros(num_envs, dtype=np.int64)  # see `infos`
         self.progress = np.zeros(num_envs)  # cells by which the last step made the way shorter, if it is rewarded
         self.path_length = np.zeros(num_envs)  # m
-        self.steps = np.zeros(num_envs, dtype=np.int64)
+        self.steps, self.waited = np.zeros((2, num_envs), dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
         self.goal_reached = np.zeros(num_envs, dtype=bool)  # also a goal that another one follows
 
@@ -129,6 +132,7 @@ class Rules:
         self.is_first[i] = self.reached[i] = self.timed_out[i] = self.goal_reached[i] = False
         self._state_errors[i], self._noise[i] = [], self._sensors.begin(episode)
         self._standing.pop(i, None)
+        self._keepers.pop(i, None)
         if episode is None:
             return
 
@@ -140,19 +144,21 @@ class Rules:
         changes = (each.standing(rng) for each, rng in perturbations_of(task, episode, Of.BUILDING))
         if standing := [change for change in changes if change is not None]:
             self._standing[i] = standing
+        if (schedule := schedule_of(task, episode)) is not None:
+            self._keepers[i] = DoorKeeper(schedule, len(task.mazes))
         maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
         self.level[i] = 0 if task.options.track is None else episode_level(task, episode)
         self.track[i] = task.options.track or ""
         self.pose[i] = (*maze.point(episode.start), episode.yaw)
-        self.path_length[i] = self.steps[i] = self.progress[i] = 0
+        self.path_length[i] = self.steps[i] = self.waited[i] = self.progress[i] = 0
         self.cell[i] = episode.start[0] * task.size + episode.start[1]
         self._seek(i, route, shown)
         self._begin_leg(i, route, shown)
 
     def _seek(self, i: int, route: Route, shown: ShownMap) -> None:
         """Measures the way to the goal of environment i, which is new."""
-        maze, start = self.task.mazes[self.maze[i]], route.cells[0]
+        maze, start = self.task.standing[self.maze.item(i)].as_built, route.cells[0]
         self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, (start, route.goal))
         self.distance[i] = self.way_left[i] = _UNKNOWN
         self._ways[i] = None
@@ -167,7 +173,7 @@ class Rules:
         self.context[i] = leg_context(self.task, shown, route.start, route.target)
         cells = np.array([route.start, route.target, route.goal])
         self.start[i], self.target[i], self._goal[i] = cells @ (size, 1)
-        self.marker[i, :2] = self.task.mazes[self.maze[i]].point(route.goal)
+        self.marker[i, :2] = self.task.standing[self.maze.item(i)].point(route.goal)
         self.time_limit[i], self._deadline[i] = route.time_limit, route.deadline
         self.landmark[i] = route.leg
 
@@ -180,7 +186,7 @@ class Rules:
         Returns the environments in which another maze stands from now on.
         """
         self._move(poses, running)
-        return self._change(running) if self._standing else []
+        return self._change(running) if self._standing or self._keepers else []
 
     def _move(self, poses: np.ndarray, running: np.ndarray) -> None:
         """Takes note of where the bodies are, and of what that led to."""
@@ -192,9 +198,11 @@ class Rules:
             happened.fill(0)
         moved = poses[:, :2] - self.pose[:, :2]
         moved *= moved
-        self.path_length += np.sqrt(moved[:, 0] + moved[:, 1])
+        moved = np.sqrt(moved[:, 0] + moved[:, 1])
+        self.path_length += moved
         self.pose[:] = poses
         self.steps += running
+        self.waited += (moved < _WAITS) & running
 
         # All mazes have one size and one cell size, so the first one converts the points of all.
         cells = self.task.mazes[0].cell_index(self.pose[:, :2])
@@ -213,7 +221,9 @@ class Rules:
         self.progress[0] = 0.0
         (last_x, last_y, _), (x, y, _) = self.pose[0].tolist(), pose.tolist()
         moved_x, moved_y = x - last_x, y - last_y
-        self.path_length[0] += math.sqrt(moved_x * moved_x + moved_y * moved_y)
+        moved = math.sqrt(moved_x * moved_x + moved_y * moved_y)
+        self.path_length[0] += moved
+        self.waited[0] += moved < _WAITS
         self.pose[0] = pose
         self.steps[0] = steps = self.steps.item(0) + 1
         row, column = cell = self.task.mazes[0].cell_at(x, y)
@@ -250,20 +260,29 @@ class Rules:
 
     def _change(self, running: np.ndarray) -> list[int]:
         """Exchanges the mazes of buildings that change now, and measures the ways in them; returns where."""
-        changed = []
+        before = self.maze.copy()
         for i, standing in self._standing.items():
-            if not running[i]:
-                continue
-            before, cell = self.maze.item(i), divmod(self.cell.item(i), self.task.size)
-            for stands in standing:
+            for stands in standing if running[i] else ():
+                cell = divmod(self.cell.item(i), self.task.size)
                 self.maze[i] = stands(self.steps.item(i), self.maze.item(i), cell)
-            if self.maze[i] == before:
-                continue
-            changed.append(i)
-            if self._ways[i] is not None and (route := self.routes[i]) is not None:
-                self._ways[i] = ways = self.task.mazes[self.maze[i]].distances(route.goal).ravel()
+        if self._keepers:
+            runs, steps, mazes, points = (each.tolist() for each in (running, self.steps, self.maze, self.pose[:, :2]))
+            for i, keeper in self._keepers.items():
+                if runs[i] and (maze := keeper.after(steps[i], mazes[i], points[i])) != mazes[i]:
+                    self.maze[i] = maze
+
+        changed = np.flatnonzero(self.maze != before).tolist()
+        for i in changed:
+            built, last = (self.task.standing[number].as_built for number in (self.maze.item(i), before.item(i)))
+            if built is not last and self._ways[i] is not None and (route := self.routes[i]) is not None:
+                self._ways[i] = ways = built.distances(route.goal).ravel()
                 self.way_left[i] = ways[self.cell[i]]
         return changed
+
+    def schedules(self) -> list[Schedule | None]:
+        """Returns the schedule of the doors in each environment; None where none moves."""
+        keepers = map(self._keepers.get, range(len(self.maze)))
+        return [None if keeper is None else keeper.schedule for keeper in keepers]
 
     def rewards(self) -> np.ndarray:
         """Returns the rewards `[B]` float32 of the last step."""
@@ -303,11 +322,13 @@ class Rules:
         - is_first: bool, whether the context is new: an episode or the leg to the next landmark began.
         - success: bool, whether the last goal is reached. goal_reached: whether the step reached a goal, which
           another one may follow.
-        - steps: since the episode began. path_length: m. landmark: the leg's index.
+        - steps: since the episode began. waited: those of them in which the body moved less than 0.05 m.
+        - path_length: m. landmark: the leg's index.
         - time_limit: the agent steps of the leg; on a track they depend on its distance. steps_left: of them.
         - position: `[B, 2]` m, and yaw: rad, both the true ones.
         - distance: the cells of a shortest path from start to goal in the true maze. way_left: from the body to the
           goal. They are -1 in a maze of more than 2,048 free cells, where they take long, unless progress is rewarded.
+          Doors that close while one drives count as open.
         - blocked: bool, whether a wall of the true maze stands in the shortest path on the shown map.
         - Of several goals, these three are of the present one.
         - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
@@ -318,10 +339,11 @@ class Rules:
             "success": self.reached.copy(),
             "goal_reached": self.goal_reached.copy(),
             "steps": self.steps.copy(),
+            "waited": self.waited.copy(),
             "path_length": self.path_length.copy(),
             "position": self.pose[:, :2].copy(),
             "yaw": wrap_angle(self.pose[:, 2]),
-            "maze": self.maze.copy(),
+            "maze": self.maze % len(self.task.mazes),
             "landmark": self.landmark.copy(),
             "time_limit": self.time_limit.copy(),
             "steps_left": self._deadline - self.steps,
@@ -341,10 +363,11 @@ class Rules:
             "success": self.reached.item(i),
             "goal_reached": self.goal_reached.item(i),
             "steps": steps,
+            "waited": self.waited.item(i),
             "path_length": self.path_length.item(i),
             "position": self.pose[i, :2].copy(),
             "yaw": wrap_angle(self.pose.item(i, 2)),
-            "maze": self.maze.item(i),
+            "maze": self.maze.item(i) % len(self.task.mazes),
             "landmark": self.landmark.item(i),
             "time_limit": self.time_limit.item(i),
             "steps_left": self._deadline.item(i) - steps,

@@ -11,6 +11,7 @@ from typing import Any
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.options import check_names, fields_of
 from mazebench.tasks.arena import Arena, arena_of, pixels_of_track
 from mazebench.tasks.context import default_context_size
@@ -99,6 +100,11 @@ class Task:
         return self.arena.mazes
 
     @property
+    def standing(self) -> StandingMazes:
+        """The mazes by the numbers that say what stands: `mazes`, and behind them those in which doors are closed."""
+        return self.arena.standing
+
+    @property
     def size(self) -> int:
         """N, cells a side of all mazes."""
         return self.arena.size
@@ -132,6 +138,11 @@ class Task:
     def changes_buildings(self) -> bool:
         """True if the mazes are buildings in which things have changed, made of mazes of one's own."""
         return self.arena.shown is not None and self.options.shown is None
+
+    @property
+    def moves_doors(self) -> bool:
+        """True if doors close and open while one drives."""
+        return self.options.track is not None and TRACKS[self.options.track].moves_doors
 
     @property
     def has_legs(self) -> bool:
@@ -203,6 +214,8 @@ def resolve(
         )
     if asked.actions == "velocity" and not body.strafes:
         raise InputError(f"body {body.name!r}: can't strafe, so expected actions six, four or diff, found 'velocity'")
+    if arena.moves_doors and not body.strafes:
+        raise InputError(f"body {body.name!r}: expected a body that slides where doors move, found one on two wheels")
     split, level = asked.split or "train", asked.level or (() if asked.track is None else LEVELS[:1])
     if asked.track is not None:
         arena.require_levels(asked.track, level)
@@ -322,7 +335,8 @@ def in_the_same_mazes(tasks: Sequence[Task], context_size: int | None = None) ->
             "older map of them (--shown)"
         )
     context_size = context_size or max(task.context_size for task in tasks)
-    return tuple(dataclasses.replace(task, context_size=context_size, arena=tasks[0].arena) for task in tasks)
+    arena = next((task.arena for task in tasks if task.arena.moves_doors), tasks[0].arena)
+    return tuple(dataclasses.replace(task, context_size=context_size, arena=arena) for task in tasks)
 
 
 def _fitting_distances(asked: TaskOptions, arena: Arena, by_default: tuple[int, ...]) -> tuple[int, ...]:

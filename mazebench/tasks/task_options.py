@@ -14,6 +14,7 @@ from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, one_line
 from mazebench.maps.benchmark import (
     ALL_SPLITS,
+    DOORS_BENCHMARK,
     FROZEN_SPLITS,
     GOALS_BENCHMARK,
     KINDS_SIZE,
@@ -346,6 +347,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
             return PAPER_BENCHMARK
         if self.is_frozen_building:
             return REAL_BENCHMARK
+        if TRACKS[self.track].moves_doors:
+            return DOORS_BENCHMARK
         return TRACKS_BENCHMARK if self.num_goals == 1 else GOALS_BENCHMARK
 
     @property

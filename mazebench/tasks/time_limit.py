@@ -13,8 +13,9 @@ from mazebench.world.bodies import Body
 
 TIME_LIMIT = 100  # in the mazes of the paper's protocol
 
-# Metres that a body can drive in the steps to spare; the second one, so that a lost robot can look for its pose.
-_SPARE, _LOST_SPARE = 25, 75
+# Metres that a body can drive in the steps to spare; a lost robot can look for its pose in the second ones, and a
+# robot can wait for doors in the third ones.
+_SPARE, _LOST_SPARE, _WAITING_SPARE = 25, 75, 150
 
 
 def default_time_limit(num_cells: int, cell_size: float, body: Body, *, track: str | None, is_new: bool = False) -> int:
@@ -27,6 +28,7 @@ def default_time_limit(num_cells: int, cell_size: float, body: Body, *, track: s
     of_metre, of_turn = math.ceil(1 / (body.top_speed * STEP_TIME)), body.quarter_turn_steps
     if track is not None:
         steps = math.ceil((of_metre + of_turn) * cell_size * num_cells)
-        return steps + of_metre * (_LOST_SPARE if TRACKS[track].hides_pose else _SPARE)
+        spare = _LOST_SPARE if TRACKS[track].hides_pose else _WAITING_SPARE if TRACKS[track].moves_doors else _SPARE
+        return steps + of_metre * spare
     steps = math.ceil((of_metre * cell_size + of_turn) * num_cells)
     return max(TIME_LIMIT, steps + of_metre * _SPARE) if is_new else TIME_LIMIT

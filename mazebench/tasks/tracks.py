@@ -8,12 +8,14 @@ from collections.abc import Sequence
 from mazebench.maps.maze import Maze
 from mazebench.tasks.perturbations.hand_drawing import HandDrawnMap
 from mazebench.tasks.perturbations.moved_doors import MovedDoors
+from mazebench.tasks.perturbations.moving_doors import MovingDoors
 from mazebench.tasks.perturbations.odometry import LostPose, MotionNoise
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
 from mazebench.tasks.perturbations.turned_map import HiddenStart, TurnedMap
-from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT, ROUGH
+from mazebench.tasks.streams import ADRIFT, BUILDING, DOORS, REBUILT, ROUGH
 
 LEVELS = (1, 2, 3)
+STANDING = BUILDING, REBUILT, ADRIFT, ROUGH  # the tracks of the suite `tracks`, whose buildings stand still
 DISTANCES = tuple(range(15, 41))  # m between start and goal
 MAX_CELL_SIZE = 1.0  # m; doors of 0.9 m would vanish in larger cells
 
@@ -65,7 +67,12 @@ class Track:
     @property
     def differs_in_building(self) -> bool:
         """True if its levels differ in nothing but the building."""
-        return len({level.of(Of.MAP, Of.SENSES) for level in self.levels}) == 1
+        return len({level.of(Of.MAP, Of.SENSES, Of.DOORS) for level in self.levels}) == 1
+
+    @property
+    def moves_doors(self) -> bool:
+        """True if doors close and open while one drives."""
+        return any(level.of(Of.DOORS) for level in self.levels)
 
     def require(self, maze: Maze, levels: Sequence[int]) -> None:
         """Raises `InputError` if the track can't be played in `maze`."""
@@ -134,6 +141,20 @@ TRACKS = {
                     LostPose(drifts=True),
                     HiddenStart(),
                 ),
+            ),
+        ),
+    ),
+    DOORS: Track(
+        "The map is right, and doors close and open while one drives.",
+        (
+            Level(
+                "doors close and stay closed: one on the shortest way, and up to two others",
+                (MovingDoors(opens=False),),
+            ),
+            Level("they open again, and then go on closing and opening", (MovingDoors(opens=True),)),
+            Level(
+                "all doors of the building, up to 32, close and open, each in a period of its own",
+                (MovingDoors(opens=True, all_doors=True),),
             ),
         ),
     ),

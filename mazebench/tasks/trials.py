@@ -14,6 +14,7 @@ import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.maps.benchmark import (
+    DOORS_BENCHMARK,
     GOALS_BENCHMARK,
     KINDS_SIZE,
     MAZES_PER_SPLIT,
@@ -25,7 +26,8 @@ from mazebench.maps.benchmark import (
 )
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.real_buildings import building_of
-from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair
+from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair, sample_pair_of
+from mazebench.tasks.streams import DOORS
 from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import DISTANCES
@@ -73,6 +75,11 @@ class Trial:
 def episodes_file(task: str, size: int, split: str = "eval") -> str:
     """Returns the name of the file with the frozen episodes of one task, size and split."""
     return f"episodes-{task}-{size}-{split}.csv"
+
+
+def doors_file(level: int, split: str) -> str:
+    """Returns the name of the file with the frozen episodes of one level and split of the track `doors`."""
+    return episodes_file(f"{DOORS}-{level}", KINDS_SIZE, split)
 
 
 def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split: str = "eval") -> tuple[Trial, ...]:
@@ -178,7 +185,10 @@ def _select_frozen(task: Task, wanted: int, episodes_per_maze: int | None) -> Se
         return [with_later_legs(task, trial) for trial in own[:episodes_per_maze]]
     episodes_per_maze = episodes_per_maze or FROZEN_PER_MAZE
     if task.options.track is not None:
-        rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
+        if task.moves_doors:
+            rows = _frozen_rows(f"{DOORS}-{task.options.track_level}", task.size, DOORS_BENCHMARK, frozen_split)
+        else:
+            rows = _frozen_rows("local", task.size, TRACKS_BENCHMARK, frozen_split)
         chosen = [
             index
             for index, row in enumerate(rows)
@@ -188,7 +198,7 @@ def _select_frozen(task: Task, wanted: int, episodes_per_maze: int | None) -> Se
         trials = _FrozenTrials([rows[index] for index in chosen])
         if task.options.num_goals == 1:
             return trials
-        are_frozen = task.distances == DISTANCES
+        are_frozen = task.distances == DISTANCES and not task.moves_doors
         later = frozen_legs(frozen_split, _FrozenTrials(rows)) if are_frozen else [()] * len(rows)
         return [with_later_legs(task, trial, later[index]) for index, trial in zip(chosen, trials, strict=True)]
     if task.options.is_hierarchical:
@@ -278,14 +288,13 @@ def spread_trials(task: Task, count: int, seed: int = 0) -> list[Trial]:
 def _draw_in_maze(task: Task, index: int, counts: Mapping[int, int], seed: int) -> list[Trial]:
     """Draws so many episodes at each distance in maze number `index`."""
     trials, maze = [], task.arena.fixed_mazes[index]
-    (start, goal), joined = task.arena.ends(index), task.arena.joined(index)
     for distance, count in counts.items():
         rng = np.random.default_rng([seed, maze.size, index, distance])
         seen: set[tuple[Cell, Cell]] = set()
         for _ in range(count):
             # A pair that was not drawn before, if one is found.
             for _ in range(_MAX_DRAWS):
-                pair = sample_pair(maze, distance, rng, start, goal, joined)
+                pair = sample_pair_of(task, index, distance, rng)
                 if pair not in seen:
                     break
             seen.add(pair)

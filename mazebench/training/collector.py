@@ -94,7 +94,7 @@ class Collector:
     def _scene(self) -> Scene:
         """Returns the truth of the environments now."""
         rules, velocity = self._envs.rules, self._envs.velocity()
-        cell, pose, maze, start, goal = (
-            array.copy() for array in (rules.cell, rules.pose, rules.maze, rules.start, rules.target)
+        cell, pose, maze, start, goal, step = (
+            array.copy() for array in (rules.cell, rules.pose, rules.maze, rules.start, rules.target, rules.steps)
         )
-        return Scene(cell, pose, velocity, maze, start, goal)
+        return Scene(cell, pose, velocity, maze, start, goal, step, rules.schedules())

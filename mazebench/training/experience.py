@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ class Scene(NamedTuple):
     maze: np.ndarray
     start: np.ndarray
     goal: np.ndarray
+    step: np.ndarray
+    doors: Sequence[Any]
 
 
 class Experience(NamedTuple):
@@ -48,3 +51,5 @@ class Experience(NamedTuple):
     sensors: Observation  # [B, ...] by the sensor's name, observed before the step
     stream: int  # the seed of the trajectories, which begin anew at a milestone
     notes: Any  # what the agent's `notes` returned
+    step: np.ndarray | None = None  # [B] int, the steps since the episode began
+    doors: Sequence[Any] = ()  # B of `mazebench.tasks.schedule.Schedule`, None where no door moves

@@ -118,8 +118,8 @@ def exposures_of(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.n
 
 
 def rng_of(maze: Maze) -> np.random.Generator:
-    """Returns a generator of what is drawn from a hash of the walls."""
-    return np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+    """Returns a generator of what is drawn from a hash of the walls, before any door moved."""
+    return np.random.default_rng(list(hashlib.sha256(np.packbits(maze.as_built.walls).tobytes()).digest()))
 
 
 def regions_of(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -15,12 +15,13 @@ import mujoco.batch
 import numpy as np
 
 from mazebench.constants import STEP_TIME
-from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import Maze
+from mazebench.maps.moving_doors import ChangingMazes, MovedMaze, StandingMazes, moving_doors
 from mazebench.world.bodies import Body
 from mazebench.world.mjcf import boxes_spec, parked_boxes, placed_boxes
 
 _MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
+_MOST_GRIDS = 64  # of mazes, those used last
 _AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
 _FEW = 4  # bodies in other cells, whose boxes are sooner looked up one by one
 _FIRST_WALL = 1  # index of its geom, after the floor
@@ -55,10 +56,13 @@ class NearWalls:
     boxes are enough for any cell.
     """
 
-    def __init__(self, mazes: Mazes, num_slots: int, body: Body):
-        """`num_slots` is how many mazes are kept: all of them or, of fresh mazes, one for each environment."""
+    def __init__(self, mazes: StandingMazes, num_slots: int, body: Body):
+        """`num_slots` is how many mazes are kept: all of them or, of fresh or changing ones, one per environment."""
         self._mazes, self._size, self._scale = mazes, mazes[0].size, mazes[0].cell_size
-        self._args, self._is_fresh = (mazes, num_slots, body), isinstance(mazes, FreshMazes)
+        self._args, self._is_fresh = (mazes, num_slots, body), not isinstance(mazes, tuple)
+        # By maze: what `_grid` returns of those that were shown last; [N, N] int, the set of its doors near each cell.
+        self._grids: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._near_doors: dict[int, np.ndarray] = {}
         # From the body's centre at the start of an agent step.
         reach = math.ceil((body.reach + body.fastest * STEP_TIME) / self._scale)  # cells
         width = self._size + 2 * reach
@@ -102,7 +106,8 @@ class NearWalls:
 
     def write_one(self, geoms: WallGeoms, maze: int, cell: int, env: int = 0) -> None:
         """Does what `write` does for a single environment, and prepares the cells around, which take little longer."""
-        if (boxes := self._entered.get((maze, cell))) is None:
+        key = self._stands(maze, cell), cell
+        if (boxes := self._entered.get(key)) is None:
             slot = env if self._is_fresh else maze
             if self._shown[slot] != maze:
                 self._show(slot, maze)
@@ -113,10 +118,22 @@ class NearWalls:
             cells = np.argwhere(~self._mazes[maze].walls[rows, columns]) + np.array([rows.start, columns.start])
             near = np.append(cells @ (self._size, 1), cell)  # which is a wall where there is no body
             rows_of = zip(near.tolist(), *self._near(np.full(len(near), slot), near), strict=True)
-            found = {(maze, each): values for each, *values in rows_of}
+            found = {(self._stands(maze, each), each): values for each, *values in rows_of}
             self._entered |= found
-            boxes = found[maze, cell]
+            boxes = found[key]
         _assign(geoms, env, *boxes)
+
+    def _stands(self, maze: int, cell: int) -> int:
+        """Returns the number of a maze that has the same walls near a cell, with no door moved elsewhere."""
+        if maze < (count := len(self._mazes)):
+            return maze
+        moved, maze = divmod(maze, count)
+        if (near := self._near_doors.get(maze)) is None:
+            near = self._near_doors[maze] = np.zeros((self._size, self._size), dtype=np.int64)
+            for number, (top, left, bottom, right, _) in enumerate(moving_doors(self._mazes[maze])):
+                first_row, first_column = max(0, top - self._reach), max(0, left - self._reach)
+                near[first_row : bottom + self._reach, first_column : right + self._reach] |= 1 << number
+        return maze + count * (moved & near.item(cell))
 
     def _near(self, slot: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns middles, half sides (`[E, K, 3]` m) and radii (`[E, K]` m) of the boxes near cells of slots."""
@@ -139,21 +156,44 @@ class NearWalls:
 
     def _show(self, slot: int, maze: int) -> None:
         """Puts a maze into a slot."""
-        boxes = np.array(self._mazes[maze].boxes, dtype=np.int64)  # [boxes, 4]: top, left, bottom, right
-        top, left, bottom, right = boxes.T
-        first = top * self._size + left
-        self._end[slot, first] = boxes[:, 2:]
-
-        # All cells of all boxes, one box after the other.
-        columns = right - left
-        area = (bottom - top) * columns
-        box = np.repeat(np.arange(len(boxes)), area)
-        within = np.arange(len(box)) - np.repeat(np.cumsum(area) - area, area)
-        row, column = top[box] + within // columns[box], left[box] + within % columns[box]
-        grid = np.full_like(self._first[slot], self._none)
-        grid[(row + self._reach) * self._width + column + self._reach] = first[box]
+        stands = self._mazes[maze]
+        closed = stands.moved if isinstance(stands, MovedMaze) and stands.only_closed else ()
+        grid, self._end[slot] = self._grid(maze % len(self._mazes) if closed else maze)
+        if closed:
+            grid = grid.copy()
+            inner = grid.reshape(self._width, -1)[self._reach :, self._reach :]
+            for door in closed:
+                inner[door.cells()] = door.top * self._size + door.left
         self._first[slot] = grid  # at once, because environments in other threads may read it
         self._shown[slot] = maze
+
+    def _grid(self, maze: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns what `_first` and `_end` have of a maze, and the ends of its doors when they close."""
+        if (kept := self._grids.pop(maze, None)) is None:
+            built = self._mazes[maze]
+            boxes = np.array(built.boxes, dtype=np.int64)  # [boxes, 4]: top, left, bottom, right
+            top, left, bottom, right = boxes.T
+            first = top * self._size + left
+            end = np.zeros(self._end.shape[1:], dtype=self._end.dtype)
+            end[first] = boxes[:, 2:]
+            if isinstance(self._mazes, ChangingMazes):
+                for door in moving_doors(built.as_built):
+                    if door.is_open:
+                        end[door.top * self._size + door.left] = door.bottom, door.right
+
+            # All cells of all boxes, one box after the other.
+            columns = right - left
+            area = (bottom - top) * columns
+            box = np.repeat(np.arange(len(boxes)), area)
+            within = np.arange(len(box)) - np.repeat(np.cumsum(area) - area, area)
+            row, column = top[box] + within // columns[box], left[box] + within % columns[box]
+            grid = np.full_like(self._first[0], self._none)
+            grid[(row + self._reach) * self._width + column + self._reach] = first[box]
+            kept = grid, end
+            if len(self._grids) >= _MOST_GRIDS:
+                self._grids.pop(next(iter(self._grids)))
+        self._grids[maze] = kept
+        return kept
 
 
 def _assign(geoms: WallGeoms, env: np.ndarray | int, middle: np.ndarray, half: np.ndarray, radius: np.ndarray) -> None:
@@ -163,9 +203,9 @@ def _assign(geoms: WallGeoms, env: np.ndarray | int, middle: np.ndarray, half: n
     geoms.rbound[env] = radius
 
 
-def near_walls_of(mazes: Mazes, num_envs: int, body: Body) -> NearWalls:
+def near_walls_of(mazes: StandingMazes, num_envs: int, body: Body) -> NearWalls:
     """Returns the near walls of mazes for some environments; all environments with the same fixed mazes share them."""
-    return NearWalls(mazes, num_envs, body) if isinstance(mazes, FreshMazes) else _of_fixed(mazes, body)
+    return _of_fixed(mazes, body) if isinstance(mazes, tuple) else NearWalls(mazes, num_envs, body)
 
 
 @functools.lru_cache(maxsize=8)

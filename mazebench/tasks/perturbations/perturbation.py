@@ -6,12 +6,13 @@ import abc
 import dataclasses
 import enum
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from mazebench.maps.maze import Cell, Maze
+from mazebench.tasks.schedule import DoorTimes
 from mazebench.tasks.streams import Stream
 
 # Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode. It is an
@@ -78,6 +79,7 @@ class Of(enum.Enum):
 
     MAP = enum.auto()  # how it is drawn
     BUILDING = enum.auto()  # in what it differs from its map; an older map of a user's own tells it instead
+    DOORS = enum.auto()  # which of the building's close and open while one drives
     SENSES = enum.auto()  # the observed states; the option `exact_pose` leaves it out
 
 
@@ -90,6 +92,7 @@ class Perturbation:
     - `shown`: the map that is shown, in a maze that is the true building. Called once an episode.
     - `building`: the true building, of a maze of a user's own that is its plan. Called when the mazes are read.
     - `standing`: the maze that stands after each step, for a building that changes. Called once an episode.
+    - `times`: when doors close and open in an episode. Called once an episode.
     - `observed`: the error of the observed states. Called once an episode.
     """
 
@@ -117,6 +120,13 @@ class Perturbation:
         All mazes of a task have one size. A wall must not come to stand where the body is.
         """
         return None
+
+    def times(self, maze: Maze, ends: Sequence[Cell], rng: np.random.Generator) -> dict[int, DoorTimes]:
+        """Returns the times of the doors that move, by their numbers among `moving_doors` of the maze; here none.
+
+        `ends` are the episode's start and goals.
+        """
+        return {}
 
     def observed(self, rng: np.random.Generator) -> StateError | None:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""
