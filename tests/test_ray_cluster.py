@@ -20,7 +20,6 @@ from mazebench.evaluation.ray_cluster import RayExecutor
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.training.loop import train
-from mazebench.training.run_folder import checkpoints
 from mazebench.training.seeds import train_seeds
 from mazebench.training.train_options import TrainOptions
 
@@ -93,17 +92,20 @@ def test_trainings_go_on_where_a_node_was_killed(tmp_path, cluster, nodes):
     options = TrainOptions(overrides=TINY, **values)
     folders = {seed: tmp_path / "there" / str(seed) for seed in (0, 1)}
 
-    def kill_a_node() -> None:
-        while not all(len(checkpoints(folder)) > 1 for folder in folders.values()):
+    def kill_the_node_of_the_first() -> None:
+        """Kills the node whose training is the first to reach a milestone; a file is named after its process."""
+        while not (begun := [path for folder in folders.values() for path in folder.glob("tensorboard/*")]):
             time.sleep(0.05)
-        node = nodes.pop()
-        processes = descendants(node.all_processes["raylet"][0].process.pid)
+        process = int(begun[0].suffix[1:])
+        processes = {node: descendants(node.all_processes["raylet"][0].process.pid) for node in nodes}
+        node = next(node for node in nodes if process in processes[node])
+        nodes.remove(node)
         cluster.remove_node(node, allow_graceful=False)
-        for process in processes:  # which a node that loses its power would not leave
+        for each in processes[node]:  # which a node that loses its power would not leave
             with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
+                os.kill(each, signal.SIGKILL)
 
-    thread = threading.Thread(target=kill_a_node)
+    thread = threading.Thread(target=kill_the_node_of_the_first)
     thread.start()
     with RayExecutor("ray") as executor:
         train_seeds(options, TaskOptions(), folders, executor=executor)
