@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.maps.drawn import MazeRows, Mazes
+from mazebench.maps.drawn import MazeRows
+from mazebench.maps.moving_doors import StandingMazes
 
 NUM_RAYS = 32
 MAX_RANGE = 5.0  # m
@@ -49,7 +50,7 @@ def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
 class Lidar:
     """The range sensor in some mazes of one size, whose cells have one size."""
 
-    def __init__(self, mazes: Mazes, max_range: float = MAX_RANGE):
+    def __init__(self, mazes: StandingMazes, max_range: float = MAX_RANGE):
         """Sees as far as `max_range` (m)."""
         self._max_range, self._cell_size = max_range, mazes[0].cell_size
         self._walls = MazeRows(lambda number: (mazes[number].walls,))
