@@ -28,7 +28,7 @@ class Truth(NamedTuple):
     walls: np.ndarray  # [B, N, N] bool, the true maze
     pose: np.ndarray  # [B, 3] float64, x and y (m) and yaw (rad)
     goal: np.ndarray  # [B, 2] int, the present goal's cell (row, column)
-    doors: Sequence[Any] | None = None  # B of `mazebench.tasks.schedule.Schedule`, where doors move; else None
+    doors: Any = None  # where doors move: B of `mazebench.tasks.schedule.Schedule`
 
 
 class Inputs(NamedTuple):
@@ -240,7 +240,9 @@ class _SingleAgents(Agent):
         agent = state[slot]
         agent.seed, agent.new_episode = int(inputs.seed[slot]), bool(inputs.new_episode[slot])
         if inputs.truth is not None:
-            agent.truth = Truth(*(None if values is None else values[slot] for values in inputs.truth))
+            truth = inputs.truth
+            doors = None if truth.doors is None else truth.doors[slot]
+            agent.truth = Truth(truth.walls[slot], truth.pose[slot], truth.goal[slot], doors)
         if inputs.new_context[slot]:
             agent.reset(observation)
         return agent.act(observation)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import pathlib
 from typing import ClassVar, Self
 
@@ -81,7 +80,7 @@ class Navigator(Agent):
                 closed = None if robot.passages is None else robot.passages.costs(memory)
                 path = plan(walls, goal, memory.cell, self._cell_size, closed) if goal.any() else []
                 if closed is not None:  # as far as the first closed passage
-                    path = list(itertools.takewhile(lambda cell, closed=closed: closed[cell] == np.inf, path))
+                    path = path[: int(np.argmax([closed[cell] < np.inf for cell in path] + [True]))]
                     path = path if len(path) > 1 or goal[memory.cell] else []
 
                 # It drives along the path, and waits where there is none.

@@ -6,8 +6,8 @@ Given that it has been closed for s steps, it opens in the next step with the pr
     h(s) = q exp(-s / T) / (T (1 - q + q exp(-s / T))),  q = OPENS, T = STAYS.
 
 Waiting a step more costs a step, and saves the detour with probability h. Since h falls, it is best to wait as long as
-1 / h is less than the steps of the detour. So 1 / h is the cost of the passage: the expected time until it opens, had it
-no memory. `benchmarks.fit_waiting` fits both numbers on train episodes.
+1 / h is less than the steps of the detour. So 1 / h is the cost of the passage: the expected time until it opens if it
+had no memory. `benchmarks.fit_waiting` fits both numbers on train episodes.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy as np
 from ..robot.occupancy import SURE
 from ..robot.senses import Memory
 
-OPENS = 0.8  # share of the closed passages that open again
-STAYS = 40.0  # steps, the mean time for which these stay closed
+OPENS = 0.67  # share of the closed passages that open again
+STAYS = 33.0  # steps, the mean time for which these stay closed
 _STEPS_PER_METRE = 2.05  # of the navigator's drives
 _FREE_ON_MAP = 0.5  # probability of a wall by the map, up to which a wall may be a closed passage
 _FREE = (

@@ -142,6 +142,7 @@ SUITES: dict[str, tuple[Part, ...]] = {
     # Doors that close and open while one drives.
     "doors": _each_level((DOORS,)),
     "doors-dev": _each_level((DOORS,), split=DEV),
+    "doors-no-map": _each_level((DOORS,), hide=("map",)),
     # Frozen real buildings: what old maps and right maps are worth there.
     "real": _in_real_buildings("eval"),
     "real-dev": _in_real_buildings(DEV),

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from mazebench.maps.drawn import Mazes
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.world.bodies import Body
 from mazebench.world.mjcf import maze_spec
 
@@ -17,7 +17,7 @@ _MOST_GEOMS = 500_000  # in the models that are kept, some 1 kB each
 class MazeModels:
     """The whole models of some mazes with a body; those used last are kept."""
 
-    def __init__(self, mazes: Mazes, body: Body):
+    def __init__(self, mazes: StandingMazes, body: Body):
         self._mazes, self._body = mazes, body
         self._kept: dict[int, mujoco.MjModel] = {}  # the one used last at the end
         self._num_geoms = 0
@@ -42,6 +42,6 @@ class MazeModels:
 
 
 @functools.lru_cache(maxsize=8)
-def models_of(mazes: Mazes, body: Body, /) -> MazeModels:
+def models_of(mazes: StandingMazes, body: Body, /) -> MazeModels:
     """Returns the models of `mazes`, which all environments with these mazes and this body share."""
     return MazeModels(mazes, body)

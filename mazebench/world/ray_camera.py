@@ -18,8 +18,9 @@ import numpy as np
 
 from mazebench.kernels import compiled, num_threads
 from mazebench.maps import colors
-from mazebench.maps.drawn import MazeRows, Mazes
+from mazebench.maps.drawn import MazeRows
 from mazebench.maps.maze import WALL_HEIGHT
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.world import looks
 from mazebench.world.looks import MAX_DEPTH, NUM_NOISE, TEXELS, Camera, Look
 
@@ -218,7 +219,7 @@ def _noise() -> np.ndarray:
 class RayCamera:
     """The camera of bodies in some mazes of one size."""
 
-    def __init__(self, mazes: Mazes, camera: Camera, look: str = looks.PLAIN, is_unseen: bool = False):
+    def __init__(self, mazes: StandingMazes, camera: Camera, look: str = looks.PLAIN, is_unseen: bool = False):
         """Takes pictures of a look, as `looks.look_of`."""
         self._camera, self._cell_size = camera, mazes[0].cell_size
         self._lens = lens_of(camera, self._cell_size)

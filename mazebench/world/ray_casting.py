@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.maps.drawn import MazeRows, Mazes
+from mazebench.maps.drawn import MazeRows
+from mazebench.maps.moving_doors import StandingMazes
 
 NUM_RAYS = 32
 MAX_RANGE = 5.0  # m
@@ -57,7 +58,7 @@ def ahead_of(pose: np.ndarray, offset: float) -> np.ndarray:
 class Lidar:
     """The range sensor in some mazes of one size, whose cells have one size."""
 
-    def __init__(self, mazes: Mazes, max_range: float = MAX_RANGE, offset: float = 0.0):
+    def __init__(self, mazes: StandingMazes, max_range: float = MAX_RANGE, offset: float = 0.0):
         """Sees as far as `max_range` (m) from a point `offset` (m) ahead of the bodies' centres."""
         self._max_range, self._cell_size, self._offset = max_range, mazes[0].cell_size, offset
         self._walls = MazeRows(lambda number: (mazes[number].walls,))

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
-from mazebench.maps.drawn import Mazes
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.world.backend import RenderingError, rendering_error
 from mazebench.world.bodies import SLIDER, Body
 from mazebench.world.mjcf import boxes_spec, wall_boxes
@@ -25,7 +25,7 @@ class Cameras:
     One model without walls does for all mazes: a picture is given the boxes.
     """
 
-    def __init__(self, mazes: Mazes, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, body: Body = SLIDER):
+    def __init__(self, mazes: StandingMazes, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, body: Body = SLIDER):
         """`names` are of `CAMERAS`, `pixels` is the side of a picture, and `body` is in the mazes."""
         self._mazes, self._names, self._pixels = mazes, names, pixels
         self._model = boxes_spec(mazes[0], *np.zeros((2, 0, 3)), body=body).compile()

@@ -12,7 +12,7 @@ from dm_env import specs
 
 from mazebench.constants import MAX_PIXELS
 from mazebench.maps.colors import GOAL, to_bytes
-from mazebench.maps.drawn import Mazes
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.options import Doc, OneOf
 from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
 from mazebench.tasks.streams import Stream
@@ -86,7 +86,7 @@ class CameraSensor(Sensor[CameraOptions]):
         shape, kind, highest = PICTURES[name]
         return specs.BoundedArray((options.camera_size, options.camera_size, *shape), kind, 0, highest, name)
 
-    def __init__(self, names: tuple[str, ...], options: CameraOptions, mazes: Mazes):
+    def __init__(self, names: tuple[str, ...], options: CameraOptions, mazes: StandingMazes):
         # Imported here: who only reads a task's options, such as the command line, shall not load numba.
         from mazebench.world.ray_camera import RayCamera
 

@@ -13,7 +13,7 @@ import numpy as np
 from dm_env import specs
 
 from mazebench.errors import InputError
-from mazebench.maps.drawn import Mazes
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.options import Doc, ReadBy
 from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
 from mazebench.tasks.streams import Stream
@@ -80,7 +80,7 @@ class LidarSensor(Sensor[LidarOptions]):
         # From 0, although a model may see nothing so near, because other libraries fill in zeros where nothing is.
         return specs.BoundedArray((NUM_RAYS,), np.float32, 0.0, options.lidar.max_range, name)
 
-    def __init__(self, names: tuple[str, ...], options: LidarOptions, mazes: Mazes):
+    def __init__(self, names: tuple[str, ...], options: LidarOptions, mazes: StandingMazes):
         (self._name,) = names
         self._model = options.lidar
         self.stream = Stream.LIDAR_NOISE if self._model.is_random else None

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 import numpy as np
 from dm_env import specs
 
-from mazebench.maps.drawn import Mazes
+from mazebench.maps.moving_doors import StandingMazes
 from mazebench.options import Options, fields_of
 from mazebench.tasks.streams import Stream
 from mazebench.world.bodies import SLIDER, Body
@@ -75,7 +75,7 @@ class Sensor(abc.ABC, Generic[OwnOptions]):
         """Returns shape, type and range of what the sensor called `name` observes of one environment."""
 
     @abc.abstractmethod
-    def __init__(self, names: tuple[str, ...], options: OwnOptions, mazes: Mazes):
+    def __init__(self, names: tuple[str, ...], options: OwnOptions, mazes: StandingMazes):
         """Opens the sensors called `names`."""
 
     @abc.abstractmethod
