@@ -14,7 +14,6 @@ from mazebench.world.bodies.rolling import FOLLOWING, GRIP, SHARES
 
 from .motion import CONTACT_DAMPING, CONTACT_STIFFNESS, IMPEDANCE, push_of_walls
 
-
 # A capsule touches a wall by its two ends: how much more two contacts push than the one of `push_of_walls`.
 _CONTACTS = 2 / (1 + IMPEDANCE)
 
