@@ -63,7 +63,7 @@ def evaluate(
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
     if suite is not None:
-        own = (*fields_of(TaskOptions), *EPISODES)
+        own = {*fields_of(TaskOptions), *EPISODES} - {"body"}
         if named := [name for name in values if name in own]:
             raise InputError(f"the suite {suite!r} has evaluations of its own; found --{named[0].replace('_', '-')}")
     run = RunOptions(**options_in(values, RunOptions))
@@ -106,7 +106,9 @@ def evaluate(
                     summaries = [summary] if summary else []
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
-                    summaries = run_suite(suite, agents, folder, run, show, summing, shard=share, **chosen)
+                    summaries = run_suite(
+                        suite, agents, folder, run, show, summing, shard=share, body=task.body, **chosen
+                    )
             if shard is not None:
                 end_shard(folder, share)
             elif suite is None:

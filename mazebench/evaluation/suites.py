@@ -30,6 +30,7 @@ from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, STANDING, TRACKS
 from mazebench.tasks.trials import Trial
+from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import VARIED
 
 _DEFAULT_RUN = RunOptions()
@@ -166,6 +167,7 @@ def run_suite(
     executor: concurrent.futures.Executor | None = None,
     shard: Shard = WHOLE,
     own_parts: Sequence[Part] | None = None,
+    body: Any = SLIDER.name,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -184,6 +186,7 @@ def run_suite(
       executor: runs the episodes, as in `mazebench.evaluation.evaluate.evaluate`.
       shard: whose episodes alone are run, with the summaries of the evaluations in which it has some.
       own_parts: the parts, instead of those in `SUITES`.
+      body: what is driven, as the option of `TaskOptions` has it.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -196,7 +199,8 @@ def run_suite(
     out = out.absolute()  # agents may change the working folder
     if (checkpoint is not None or overrides) and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint or --set, found {len(agents)}")
-    parts = {part.name: part for part in own_parts or SUITES[suite]}
+    driven = own_parts or [dataclasses.replace(part, task=part.task.replace(body=body)) for part in SUITES[suite]]
+    parts = {part.name: part for part in driven}
 
     def planned(agent: str, part: Part) -> Plan:
         plan = make_plan(
