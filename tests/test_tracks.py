@@ -89,7 +89,8 @@ def test_the_task_of_a_level(track, level):
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.interface.odometry_noise == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
-    assert default_time_limit(20, 1.0, SLIDER, track=track) == (270 if is_lost else 170)
+    expected = 420 if track == "doors" else 270 if is_lost else 170
+    assert default_time_limit(20, 1.0, SLIDER, track=track) == expected
     env = mazebench.load(track, level=level, seed=0)
     state = env.reset().observation["state"]
     assert (state[[0, 1, 5]] == 0).all() == is_lost

@@ -53,7 +53,7 @@ _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in fol
 # Of records.
 _COLUMNS = [
     "episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked", "leg", "after_miss", "notes",
-    "path_length",
+    "path_length", "waited",
 ]  # fmt: skip
 # Archives of evaluations with switches of their own, in folders ROW/SETTING: the agent is called ARCHIVE/ROW.
 _SWITCHED = ("map-policy", "mmn-search")

@@ -32,6 +32,7 @@ from benchmarks.results.kept import (
     ceilings,
     estimate,
 )
+from mazebench.constants import STEP_TIME
 from mazebench.maps.benchmark import FROZEN_SPLITS, REAL_BENCHMARK, SIZES, read_asset
 from mazebench.maps.kinds import KNOWN, NOVEL
 from mazebench.maps.real_buildings import ORIGINS, SCAN, buildings
@@ -48,7 +49,7 @@ PAGES = (
     *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
-    *(f"docs/environments/{name}.md" for name in (*STANDING, "local", "hierarchical")),
+    *(f"docs/environments/{name}.md" for name in (*STANDING, "doors", "local", "hierarchical")),
 )
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
@@ -59,6 +60,17 @@ _BLOCK = re.compile(
 )
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
+DOOR_AGENTS = (
+    *(
+        "oracle",
+        "oracle-hurrying",
+        "always-waits",
+        "navigator",
+        "navigator-without-waiting",
+        "neural-planner",
+        "random",
+    ),
+)
 _TRACKS = [f"`{track}`" for track in STANDING]
 _KINDS = (*KNOWN, *NOVEL)
 _WITHOUT_MEMORY = "navigator-without-memory"
@@ -460,6 +472,24 @@ def real_left_out(kept: Kept) -> str:
     return format_table(["reason", "maps"], rows)
 
 
+def doors(kept: Kept) -> str:
+    """Returns the table of the track `doors`: on time, success and seconds waited by level."""
+    rows = []
+    for agent in DOOR_AGENTS:
+        levels = [kept.of(agent, f"doors-{level}") for level in LEVELS]
+        on_time = [_interval(ON_TIME_125, own) for own in levels]
+        success, waited = (
+            " / ".join(f"{value:{form}}" for value in values)
+            for values, form in (
+                ([own.success.astype(float).mean() for own in levels], ".2f"),
+                ([STEP_TIME * own.waited.astype(float).mean() for own in levels], ".1f"),
+            )
+        )
+        rows.append([f"`{agent}`", *on_time, success, waited])
+    head = ["agent", *(f"on time, level {level}" for level in LEVELS), "success, 1 / 2 / 3", "s waited, 1 / 2 / 3"]
+    return format_table(head, rows)
+
+
 def expected_on_track(track: str, kept: Kept) -> str:
     """Returns each agent's on-time rate at the levels of a track with its interval, and its success rates."""
     rows = []
@@ -513,6 +543,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-map-worth": tracks_map_worth,
     "tracks-blocked": tracks_blocked,
     "tracks-recall": tracks_recall,
+    "doors": doors,
     **{f"expected-{track}": functools.partial(expected_on_track, track) for track in STANDING},
     "expected-local": lambda kept: by_distance(
         "agent",

@@ -260,6 +260,10 @@ class Rules:
 
     def _change(self, running: np.ndarray) -> list[int]:
         """Exchanges the mazes of buildings that change now, and measures the ways in them; returns where."""
+        if len(self.maze) == 1 and not self._standing:  # as in `_move`
+            (before,), point = self.maze.tolist(), self.pose[0, :2].tolist()
+            self.maze[0] = maze = self._keepers[0].after(self.steps.item(0), before, point)
+            return [0] if maze != before else []
         before = self.maze.copy()
         for i, standing in self._standing.items():
             for stands in standing if running[i] else ():
