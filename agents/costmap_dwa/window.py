@@ -1,0 +1,112 @@
+"""The dynamic window (Fox, Burgard & Thrun 1997): the best of the velocities that a robot can reach in one step.
+
+Each one is driven for a while in advance, and judged by what DWB of Nav2 judges by: its distances to the path and to
+the local goal, of the robot's middle and of a point ahead of it, and the cost of the costmap.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from mazebench.constants import STEP_TIME
+from mazebench.kernels import compiled
+
+from .costmap import cost
+
+_NUM_SPEEDS, _NUM_TURNS = 8, 21
+_PATH, _GOAL, _NEAR_WALLS = 32.0, 24.0, 5.0  # weights a metre, and of the costmap's cost
+_NEARER = 0.002  # m, by which a robot that is too near to a wall may come nearer
+
+
+class Limits(NamedTuple):
+    """What a robot can do."""
+
+    top_speed: float  # m/s
+    turn_rate: float  # rad/s
+    acceleration: float  # m/s^2
+    turn_acceleration: float  # rad/s^2
+    radius: float  # m, to which no wall should come
+    horizon: float  # s, for which it drives in advance
+    ahead: float  # m, at which a point of its nose is
+
+
+@compiled
+def best_velocities(
+    limits: Limits,
+    pose: tuple[float, float, float],
+    velocities: tuple[float, float],
+    path: np.ndarray,
+    clearance: np.ndarray,
+    corner: tuple[float, float],
+    cell: float,
+) -> tuple[float, float, bool]:
+    """Returns speed (m/s), yaw rate (rad/s), and whether there are any that meet no wall.
+
+    Args:
+      limits: of the robot.
+      pose: x, y (m) and yaw (rad).
+      velocities: speed and yaw rate now.
+      path: `[K, 2]` float, points (m) from the nearest one to the local goal.
+      clearance: `[H, W]` float, m to the nearest wall, around the robot.
+      corner: m, its left and upper end.
+      cell: m.
+    """
+    speed, rate = velocities
+    gain, twist = limits.acceleration * STEP_TIME, limits.turn_acceleration * STEP_TIME
+    slowest, fastest = max(0.0, min(speed - gain, limits.top_speed)), min(limits.top_speed, max(0.0, speed + gain))
+    right, left = max(-limits.turn_rate, rate - twist), min(limits.turn_rate, rate + twist)
+    num_steps = max(8, math.ceil(limits.horizon * limits.top_speed / cell))
+    step = limits.horizon / num_steps
+    here = _clearance_at(clearance, corner, cell, pose[0], pose[1])
+    needed = min(limits.radius, here - _NEARER)
+    least, best_speed, best_rate, is_any = np.inf, 0.0, 0.0, False
+    for i in range(_NUM_SPEEDS):
+        for j in range(_NUM_TURNS):
+            v = slowest + (fastest - slowest) * i / (_NUM_SPEEDS - 1)
+            w = right + (left - right) * j / (_NUM_TURNS - 1)
+            x, y, yaw = pose
+            near, is_free = here, True
+            stopping = STEP_TIME + v / (2 * limits.acceleration)
+            for k in range(num_steps):
+                yaw_then = yaw + w * step
+                x_then = x + v * step * math.cos(yaw + w * step / 2)
+                y_then = y + v * step * math.sin(yaw + w * step / 2)
+                clear = _clearance_at(clearance, corner, cell, x_then, y_then)
+                if clear < needed:
+                    is_free = k * step > stopping
+                    near = limits.radius
+                    break
+                x, y, yaw, near = x_then, y_then, yaw_then, min(near, clear)
+            if not is_free:
+                continue
+            nose_x, nose_y = x + limits.ahead * math.cos(yaw), y + limits.ahead * math.sin(yaw)
+            off_path = _distance(path, x, y) + _distance(path, nose_x, nose_y)
+            goal_x, goal_y = path[-1]
+            off_goal = math.hypot(goal_x - x, goal_y - y) + math.hypot(goal_x - nose_x, goal_y - nose_y)
+            score = _PATH * off_path + _GOAL * off_goal + _NEAR_WALLS * cost(near, limits.radius)
+            if score < least:
+                least, best_speed, best_rate, is_any = score, v, w, True
+    return best_speed, best_rate, is_any
+
+
+@compiled
+def _clearance_at(clearance: np.ndarray, corner: tuple[float, float], cell: float, x: float, y: float) -> float:
+    # Between the middles of four cells.
+    down, right = (corner[1] - y) / cell - 0.5, (x - corner[0]) / cell - 0.5
+    down, right = min(max(down, 0.0), clearance.shape[0] - 1.001), min(max(right, 0.0), clearance.shape[1] - 1.001)
+    row, column = int(down), int(right)
+    down, right = down - row, right - column
+    upper = (1 - right) * clearance[row, column] + right * clearance[row, column + 1]
+    lower = (1 - right) * clearance[row + 1, column] + right * clearance[row + 1, column + 1]
+    return (1 - down) * upper + down * lower - cell / 2
+
+
+@compiled
+def _distance(path: np.ndarray, x: float, y: float) -> float:
+    least = np.inf
+    for k in range(len(path)):
+        least = min(least, math.hypot(path[k, 0] - x, path[k, 1] - y))
+    return least
