@@ -13,6 +13,7 @@ from mazebench.agent import Agent, Inputs, Interface
 from mazebench.constants import FORWARD_VELOCITY, STEP_TIME, YAW, YAW_RATE, X, Y
 from mazebench.errors import UnplayableError
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
+from mazebench.world.angles import wrap_angle
 from mazebench.world.bodies import Body
 
 from ..robot.cells import marked_cell
@@ -24,10 +25,12 @@ _PLAN_EVERY = round(1 / STEP_TIME)  # steps
 _HORIZON, _FARTHEST = 1.2, 1.2  # s for which it drives in advance, and the most m
 _LOCAL_GOAL = 1.3  # times as far as it drives in advance is the local goal on the path
 _NEAREST_GOAL = 0.6  # m, at least
-_MOVED, _STUCK = 0.5, round(10 / STEP_TIME)  # m that it should move in so many steps; Nav2's progress checker
+# m or rad that it should move or turn in so many steps, by Nav2's progress checker, which takes 10 s.
+_MOVED, _STUCK = 0.5, round(5 / STEP_TIME)
 _MARGIN = 0.02  # m between the robot and the distance at which walls push it
 _STANDING = 0.02  # m/s
-_RECOVERY_TURN = math.pi / 2  # rad, of a recovery; Nav2's spin
+# Recoveries as those of Nav2's behaviour trees: rad of a turn, and m and m/s of backing up.
+_TURN, _BACK, _BACKWARD = math.pi / 2, 0.3, 0.15
 
 
 def limits_of(body: Body) -> Limits:
@@ -48,9 +51,9 @@ class _Robot:
     goal: tuple[float, float] = (0.0, 0.0)  # m
     path: np.ndarray | None = None  # [K, 2] float, m; None if there is none
     until_plan: int = 0  # steps
-    turning: int = 0  # steps of a recovery that are left
+    recovery: list[tuple[float, float]] = dataclasses.field(default_factory=list)  # its actions that are left
     since_moved: int = 0  # steps
-    moved_from: tuple[float, float] = (math.inf, math.inf)  # m
+    moved_from: tuple[float, float, float] = (math.inf, math.inf, 0.0)  # m, rad
 
 
 class CostmapDWA(Agent):
@@ -118,34 +121,35 @@ class CostmapDWA(Agent):
         yaw, limits = float(values[YAW]), self._limits
         robot.costmap.sense(x, y, yaw, ranges, self._reach)
 
-        # A recovery turns on the spot.
-        if robot.turning > 0:
-            robot.turning -= 1
-            return 0.0, 1.0
+        if robot.recovery:
+            return robot.recovery.pop()
         robot.since_moved += 1
-        if math.dist(robot.moved_from, (x, y)) > _MOVED:
-            robot.moved_from, robot.since_moved = (x, y), 0
-        if robot.since_moved > _STUCK:
-            return self._recover(robot)
+        x_then, y_then, yaw_then = robot.moved_from
+        if max(math.dist((x_then, y_then), (x, y)), abs(wrap_angle(yaw - yaw_then))) > _MOVED:
+            robot.moved_from, robot.since_moved = (x, y, yaw), 0
 
         # The global plan, each second.
         if robot.until_plan <= 0:
             robot.path, robot.until_plan = self._plan(robot, x, y), _PLAN_EVERY
         robot.until_plan -= 1
         if robot.path is None:
-            return self._recover(robot)
+            robot.costmap.forget()
+            return self._recover(robot, backs=False)
 
         # The local plan: velocities along the next part of the path.
         way = limits.horizon * limits.top_speed
         count = max(1, round(max(_NEAREST_GOAL, _LOCAL_GOAL * way) / robot.costmap.cell))
         nearest = int(np.hypot(*(robot.path[: 2 * count] - (x, y)).T).argmin())
         clearance, left, upper, cell = robot.costmap.clearance_around(x, y, way + INFLATION + limits.radius)
-        speed, rate, is_any = best_velocities(
+        speed, rate, is_any, is_near = best_velocities(
             limits, (x, y, yaw), (float(values[FORWARD_VELOCITY]), float(values[YAW_RATE])),
             robot.path[nearest : nearest + count], clearance, (left, upper), cell,
         )  # fmt: skip
+        if robot.since_moved > _STUCK:
+            return self._recover(robot, is_near)
         if not is_any:  # it brakes first
-            return self._recover(robot) if abs(values[FORWARD_VELOCITY]) < _STANDING else (0.0, 0.0)
+            is_standing = abs(values[FORWARD_VELOCITY]) < _STANDING
+            return self._recover(robot, is_near) if is_standing else (0.0, 0.0)
         return speed / limits.top_speed, rate / limits.turn_rate
 
     def _plan(self, robot: _Robot, x: float, y: float) -> np.ndarray | None:
@@ -157,9 +161,11 @@ class CostmapDWA(Agent):
             return None
         return np.stack([(cells[:, 1] + 0.5) * cell, self._width - (cells[:, 0] + 0.5) * cell], axis=1)
 
-    def _recover(self, robot: _Robot) -> tuple[float, float]:
-        """Returns the first action of a recovery, which turns, forgets what was marked and cleared, and plans again."""
-        robot.costmap.forget()
-        robot.turning = math.ceil(_RECOVERY_TURN / self._limits.turn_rate / STEP_TIME)
+    def _recover(self, robot: _Robot, backs: bool) -> tuple[float, float]:
+        """Returns the first action of a recovery, which backs up or turns on the spot; then it plans again."""
+        limits = self._limits
+        speed = min(_BACKWARD, limits.top_speed)
+        num_steps = math.ceil((_BACK / speed if backs else _TURN / limits.turn_rate) / STEP_TIME)
+        robot.recovery = [(-speed / limits.top_speed, 0.0) if backs else (0.0, 1.0)] * num_steps
         robot.since_moved = robot.until_plan = 0
-        return 0.0, 1.0
+        return robot.recovery.pop()

@@ -42,8 +42,8 @@ def best_velocities(
     clearance: np.ndarray,
     corner: tuple[float, float],
     cell: float,
-) -> tuple[float, float, bool]:
-    """Returns speed (m/s), yaw rate (rad/s), and whether there are any that meet no wall.
+) -> tuple[float, float, bool, bool]:
+    """Returns speed (m/s), yaw rate (rad/s), whether there are any that meet no wall, and whether a wall is too near.
 
     Args:
       limits: of the robot.
@@ -83,13 +83,13 @@ def best_velocities(
             if not is_free:
                 continue
             nose_x, nose_y = x + limits.ahead * math.cos(yaw), y + limits.ahead * math.sin(yaw)
-            off_path = _distance(path, x, y) + _distance(path, nose_x, nose_y)
-            goal_x, goal_y = path[-1]
-            off_goal = math.hypot(goal_x - x, goal_y - y) + math.hypot(goal_x - nose_x, goal_y - nose_y)
-            score = _PATH * off_path + _GOAL * off_goal + _NEAR_WALLS * cost(near, limits.radius)
+            off, left_of_path = _to_path(path, x, y)
+            nose_off, nose_left = _to_path(path, nose_x, nose_y)
+            near_walls = cost(near, limits.radius)
+            score = _PATH * (off + nose_off) + _GOAL * (left_of_path + nose_left) + _NEAR_WALLS * near_walls
             if score < least:
                 least, best_speed, best_rate, is_any = score, v, w, True
-    return best_speed, best_rate, is_any
+    return best_speed, best_rate, is_any, here < limits.radius
 
 
 @compiled
@@ -105,8 +105,17 @@ def _clearance_at(clearance: np.ndarray, corner: tuple[float, float], cell: floa
 
 
 @compiled
-def _distance(path: np.ndarray, x: float, y: float) -> float:
-    least = np.inf
-    for k in range(len(path)):
-        least = min(least, math.hypot(path[k, 0] - x, path[k, 1] - y))
-    return least
+def _to_path(path: np.ndarray, x: float, y: float) -> tuple[float, float]:
+    """Returns the m from a point to the nearest one of a path, and those along the path from there to its end."""
+    x_then, y_then = path[0]
+    nearest, passed_there, passed = math.hypot(x - x_then, y - y_then), 0.0, 0.0
+    for k in range(1, len(path)):
+        along_x, along_y = path[k, 0] - x_then, path[k, 1] - y_then
+        length = math.hypot(along_x, along_y)
+        share = min(max(((x - x_then) * along_x + (y - y_then) * along_y) / length**2, 0.0), 1.0)
+        off = math.hypot(x_then + share * along_x - x, y_then + share * along_y - y)
+        if off < nearest:
+            nearest, passed_there = off, passed + share * length
+        passed += length
+        x_then, y_then = path[k]
+    return nearest, passed - passed_there
