@@ -60,11 +60,9 @@ class Expert:
         """Knows `mazes`, which have one size and one cell size, and the body that drives in them.
 
         Raises:
-          InputError: if the body rolls.
+          InputError: if the body does not slide.
         """
-        if not body.strafes:
-            raise InputError(f"the expert: expected a body that slides, found {body.name!r}")
-        self._mazes, self._body = mazes, body
+        self._mazes, self._motion, self._body = mazes, Motion.of(body), body
         self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course
         self._arrays: tuple[np.ndarray, ...] = ()  # walls, ways left and goals of the courses
         self._last: tuple[list[np.ndarray], np.ndarray] | None = None  # the last arguments of `costs`, and the answer
@@ -93,6 +91,6 @@ class Expert:
                     arrays[slot] = array
         walls, way_left, goals = self._arrays
         cell_size = self._mazes[0].cell_size
-        costs = costs_of_actions(Motion.of(self._body), walls, way_left, goals, cell_size, pose, velocity)
+        costs = costs_of_actions(self._motion, walls, way_left, goals, cell_size, pose, velocity)
         self._last = [array.copy() for array in asked], costs
         return costs.copy()

@@ -1,10 +1,10 @@
 """Measures how much of real buildings their mazes keep, for a folder of ROS maps.
 
-    python benchmarks/reading.py MAPS [--turn 30] > table.txt
+    python benchmarks/reading.py MAPS [--turn 30] [--radius 0.35] > table.txt
 
-The reach of a disc of 0.15 m on the pixels is the connected set of its positions that has most of the maze. The share
-that is kept lies within 0.4 m of the maze; what does not, in pieces above 2 m2, are lost regions. `--turn` turns the
-pictures first, enlarged so that their pixels lose nothing by it.
+The reach of a disc of 0.15 m, or of another radius, on the pixels is the connected set of its positions that has most
+of the maze. The share that is kept lies within 0.4 m of the maze; what does not, in pieces above 2 m2, are lost
+regions. `--turn` turns the pictures first, enlarged so that their pixels lose nothing by it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
+from mazebench.constants import SLIDER_RADIUS
 from mazebench.errors import InputError
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.occupancy_grid import FREE, UNKNOWN, LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.readers.ros import read_occupancy
 
-_RADIUS, _NEAR = 0.15, 0.4  # m
+_NEAR = 0.4  # m
 _LEAST_LOST = 2.0  # m2
 _ENLARGED = 4  # times, before a picture is turned
 _MOST_PIXELS = 3 * 10**7  # of a turned picture; larger ones are enlarged less
@@ -53,11 +54,13 @@ def turned(grid: OccupancyGrid, degrees: float) -> OccupancyGrid:
     return dataclasses.replace(grid, states=shifted.astype(np.int8) - np.int8(1), resolution=grid.resolution / times)
 
 
-def share_kept(grid: OccupancyGrid, located: LocatedMaze) -> tuple[float, list[float], float]:
+def share_kept(
+    grid: OccupancyGrid, located: LocatedMaze, radius: float = SLIDER_RADIUS
+) -> tuple[float, list[float], float]:
     """Returns the share of the disc's reach that a maze keeps, the lost regions, and the reach; both in m2."""
     free = np.pad(grid.states == FREE, 1)
     distance = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * grid.resolution
-    _, positions = cv2.connectedComponents((distance > _RADIUS).astype(np.uint8), connectivity=4)
+    _, positions = cv2.connectedComponents((distance > radius).astype(np.uint8), connectivity=4)
     in_maze = np.pad(_in_maze(grid, located), 1)
     common = np.bincount(positions[in_maze], minlength=2)
     common[0] = 0
@@ -92,7 +95,7 @@ def _in_maze(grid: OccupancyGrid, located: LocatedMaze) -> np.ndarray:
     return inside
 
 
-def measure(folder: pathlib.Path, degrees: float) -> Iterator[str]:
+def measure(folder: pathlib.Path, degrees: float, radius: float) -> Iterator[str]:
     """Yields a line of the table for each map of a folder."""
     yield "map | reach m2 | cells | share kept | lost regions m2 | CPU s | walls"
     for path in sorted(folder.glob("*.yaml")):
@@ -103,12 +106,12 @@ def measure(folder: pathlib.Path, degrees: float) -> Iterator[str]:
             try:
                 grid = turned(grid, degrees) if degrees else grid
                 begin = time.process_time()
-                located = locate_maze(grid, ReadOptions(), path.stem)
+                located = locate_maze(grid, ReadOptions(), path.stem, radius)
                 reading += time.process_time() - begin
             except (InputError, IndexError) as error:
                 yield f"{path.stem} | refused: {error}"
                 continue
-        share, lost, reach = share_kept(grid, located)
+        share, lost, reach = share_kept(grid, located, radius)
         walls = hashlib.sha256(located.maze.walls.tobytes()).hexdigest()[:12]
         yield (
             f"{path.stem} | {reach:.0f} | {located.maze.size} x {located.maze.cell_size:g} m | {share:.3f} | "
@@ -121,8 +124,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("maps", type=pathlib.Path, help="a folder of YAML files and pictures")
     parser.add_argument("--turn", type=float, default=0.0, help="degrees by which the pictures are turned first")
+    parser.add_argument("--radius", type=float, default=SLIDER_RADIUS, help="m, of the body")
     options = parser.parse_args()
-    for line in measure(options.maps, options.turn):
+    for line in measure(options.maps, options.turn, options.radius):
         print(line, flush=True)
 
 

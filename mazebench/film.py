@@ -32,7 +32,7 @@ from mazebench.tasks.sensors import LIDAR, SENSORS
 from mazebench.tasks.sensors.cameras import as_colors
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.trials import counting_option
-from mazebench.world.ray_casting import ray_ends
+from mazebench.world.ray_casting import ahead_of, ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
 
 MAP = "map"
@@ -231,7 +231,8 @@ class _Scene:
         walls, pose = self._task.mazes[self.episode.maze].walls, self.envs.rules.pose[0]
         cell_pixels = self._cell_pixels(walls)
         picture = draw_grid(walls, cell_pixels, self.episode.start, self.episode.goal, self._to_cells(self._path))
-        draw_rays(picture, cell_pixels, self._to_cells(pose[:2]), self._to_cells(ray_ends(pose, ranges)))
+        sensor = ahead_of(pose, self._task.body.lidar_offset)
+        draw_rays(picture, cell_pixels, self._to_cells(sensor[:2]), self._to_cells(ray_ends(sensor, ranges)))
         return picture
 
     def _to_cells(self, points: ArrayLike) -> np.ndarray:  # [..., 2] m

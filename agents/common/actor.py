@@ -99,10 +99,10 @@ class NetworkAgent(LearningAgent):
 
         Raises:
           InputError: if the checkpoint can't be read, or is another agent's.
-          UnplayableError: if its network serves contexts of another size only.
+          UnplayableError: if it learned on another body, or its network serves contexts of another size only.
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
-        tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
+        tensors, config, trained_size = load_agent(path, cls.name, cls.default_config, interface.body)
         size = interface.context_size
         if size != trained_size and not cls.serves_any_size(config):
             expected = f"its checkpoint reads maps of {trained_size} x {trained_size} only, found {size} x {size}"

@@ -11,12 +11,14 @@ import safetensors
 import safetensors.torch
 import torch
 
-from mazebench.errors import InputError, shortened
+from mazebench.errors import InputError, UnplayableError, shortened
 from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.options import Config, override
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
+from mazebench.world.bodies import SLIDER, Body
+from mazebench.world.bodies.described import body_of
 
 FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"
@@ -69,13 +71,28 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     return tensors, metadata
 
 
-def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[str, torch.Tensor], Config, int]:
+def require_body(metadata: Mapping[str, Any], agent: str, body: Body) -> None:
+    """Raises `UnplayableError` if `agent` learned on another body than `body`: on the slider, if metadata says none."""
+    values: Any = metadata
+    for key in ("provenance", "task"):
+        values = values.get(key) if isinstance(values, Mapping) else None
+    learned = body_of(values["body"]) if isinstance(values, Mapping) and "body" in values else SLIDER.name
+    if learned != body_of(body):
+        name = learned if isinstance(learned, str) else learned.name
+        raise UnplayableError(f"agent {agent!r}: learned on the body {name!r}, found {body.name!r}")
+
+
+def load_agent(
+    path: pathlib.Path, agent: str, default: Config, body: Body = SLIDER
+) -> tuple[dict[str, torch.Tensor], Config, int]:
     """Returns the tensors of a checkpoint of `agent`, its config, of the type of `default`, and its context size M.
 
     Raises:
       InputError: as `load_checkpoint`, or if config or context size are missing or illegal.
+      UnplayableError: as `require_body`.
     """
     tensors, metadata = load_checkpoint(path, agent)
+    require_body(metadata, agent, body)
     try:
         config, context_size = override(default, metadata["config"]), metadata["context_size"]
     except (KeyError, TypeError, ValueError, AttributeError) as error:

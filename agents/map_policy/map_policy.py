@@ -22,6 +22,7 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL
 from mazebench.world.looks import Camera
 
 from ..common.actor import acting
+from ..common.checkpoint import load_checkpoint, require_body
 from ..common.layers import in_batches
 from ..common.rollouts import Rows, Seen
 from ..imitation import ImitatingAgent
@@ -71,8 +72,10 @@ class MapPolicy(ImitatingAgent):
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
         """Returns the agent of a checkpoint, by default of the one that ships, which has no config."""
+        path = checkpoint or cls.default_checkpoint()
+        require_body(load_checkpoint(path, cls.name)[1], cls.name, interface.body)
         agent = cls(cls.default_config, interface.context_size).for_interface(interface)
-        agent.load(checkpoint or cls.default_checkpoint())
+        agent.load(path)
         return agent
 
     def for_interface(self, interface: Interface) -> Self:

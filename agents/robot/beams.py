@@ -45,13 +45,15 @@ class Beams(NamedTuple):
     metre: float = 1.0  # cells per metre
     growth: float = 0.0  # of the standard deviation, per square of a range
     weight: float = 1.0  # of what a ray tells, less than 1 where neighbouring rays share their errors
+    offset: float = 0.0  # of the sensor ahead of the body's centre, of which a pose is
 
 
-def beams_of(model: LidarModel, cells_per_metre: float) -> Beams:
-    """Returns the beam model of a sensor."""
+def beams_of(model: LidarModel, cells_per_metre: float, offset: float = 0.0) -> Beams:
+    """Returns the beam model of a sensor `offset` (m) ahead of the body's centre."""
     sigma = math.hypot(model.sigma, model.step / math.sqrt(12)) * cells_per_metre  # rounding is uniform
     sigma = max(sigma, _SIGMA * cells_per_metre)
-    return Beams(model.max_range * cells_per_metre, sigma, max(model.lost, _LOST), _RANDOM, cells_per_metre)
+    reach, offset = model.max_range * cells_per_metre, offset * cells_per_metre
+    return Beams(reach, sigma, max(model.lost, _LOST), _RANDOM, cells_per_metre, offset=offset)
 
 
 @inlined
@@ -100,6 +102,7 @@ def log_likelihood(
     total, size, num_rays = 0.0, len(walls), len(ranges)
     turn_cosine, turn_sine = math.cos(2 * math.pi / num_rays), math.sin(2 * math.pi / num_rays)
     along_x, along_y = math.cos(yaw), math.sin(yaw)
+    x, y = x + beams.offset * along_x, y + beams.offset * along_y
     for i in range(num_rays):
         reading, passed, likelihood = ranges[i], 1.0, 0.0
         ray = rays.ray_from(x, y, along_x, along_y)
@@ -137,6 +140,8 @@ def add_scan(
     rows, columns = np.empty(most, np.int64), np.empty(most, np.int64)
     hits, walls, may_free, may_mark = np.empty(most), np.empty(most), np.empty(most, np.bool_), np.empty(most, np.bool_)
     margin, behind = _MARGIN * beams.metre + 2 * deviation, _BEHIND * beams.metre
+    body_x, body_y = x, y
+    x, y = x + beams.offset * math.cos(yaw), y + beams.offset * math.sin(yaw)
     for i in range(len(ranges)):
         angle, reading = yaw + 2 * math.pi * i / len(ranges), ranges[i]
         if math.isnan(reading):
@@ -179,6 +184,6 @@ def add_scan(
             before += passed * walls[k] * hits[k]
             passed *= 1 - walls[k]
     # The body is in a free cell.
-    column, row = math.floor(x), size - 1 - math.floor(y)
+    column, row = math.floor(body_x), size - 1 - math.floor(body_y)
     if 0 <= row < size and 0 <= column < size:
         evidence[row, column] = max(evidence[row, column] - _LARGEST_STEP, -MOST_EVIDENCE)

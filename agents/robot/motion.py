@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.constants import PHYSICS_TIMESTEP, STEPS_PER_ACTION
+from mazebench.errors import InputError
 from mazebench.kernels import compiled, inlined
 from mazebench.world.bodies import Body, SlidingBody
 from mazebench.world.bodies.body import CONTACT_SOLREF
@@ -42,8 +43,9 @@ class Motion(NamedTuple):
 
     @classmethod
     def of(cls, body: Body) -> Motion:
-        """Returns that of a sliding body."""
-        assert isinstance(body, SlidingBody)
+        """Returns that of a body; raises `InputError` if it does not slide."""
+        if not isinstance(body, SlidingBody):
+            raise InputError(f"body {body.name!r}: expected a body that slides")
         contact = body.reach, body.mass * CONTACT_DAMPING, body.mass * CONTACT_STIFFNESS
         drive = body.damping, body.drive_gain, body.drive_speed, body.drive_force
         return cls(body.mass, *drive, *contact, body.coasting_time, body.turn_step, body.top_speed)

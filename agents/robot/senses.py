@@ -116,7 +116,8 @@ class Senses:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
         self._body, self._odometry_noise = interface.body, interface.odometry_noise
-        self._beams, self._camera = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size), None
+        lidar = interface.lidar or LidarModel()
+        self._beams, self._camera = beams_of(lidar, 1 / self._cell_size, self._body.lidar_offset), None
         ranging = range_sensor(interface.sensors)
         self._has_ranges = ranging == ("lidar",)
         self.feels, self.is_narrow = not self._has_ranges, False  # whether it also feels walls, and sees ahead only

@@ -106,7 +106,7 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
         kind, default = (choice | None, None) if default is None else (choice, choice(default))
     elif name == "overrides":
         kind, default, metavar = list[str], [], "KEY=VALUE"
-    elif name in ("mazes", "shown"):  # in Python also values, on the command line a path
+    elif name in ("mazes", "shown", "body"):  # in Python also values, on the command line a path
         kind = str | None
     flags = {"task": ("--task", "--track"), "overrides": ("--set",)}.get(name, ())
     annotation = Annotated[kind, typer.Option(*flags, help=option.help, metavar=metavar)]

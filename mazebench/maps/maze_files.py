@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mazebench.constants import SLIDER_RADIUS
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
@@ -35,7 +36,9 @@ SUFFIXES = (*ROS_SUFFIXES, ".txt", ".map", *_TABLE_SUFFIXES, *ARRAY_SUFFIXES, *I
 _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 
 
-def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any) -> Maze:
+def read_maze(
+    path: str | pathlib.Path, size: int | None = None, *, radius: float = SLIDER_RADIUS, **options: Any
+) -> Maze:
     """Reads the maze in one file: a ROS map, an array or a picture if the suffix says so; else a picture or text.
 
         >>> maze = mazebench.read_maze("plan.png")
@@ -43,15 +46,18 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Args:
       path: of the file; of a ROS map, of its YAML file.
       size: N that the maze must have; for a picture whose cells can't be counted, the cells on its longer side.
+      radius: m, of the body that is to drive in it.
       **options: those of `mazebench.maps.maze_options.ReadOptions`.
 
     Raises:
       InputError: if the file can't be read or holds no legal maze.
     """
-    return read_located(path, size, **options).maze
+    return read_located(path, size, radius=radius, **options).maze
 
 
-def read_mazes(path: str | pathlib.Path, size: int | None = None, **options: Any) -> tuple[Maze, ...]:
+def read_mazes(
+    path: str | pathlib.Path, size: int | None = None, *, radius: float = SLIDER_RADIUS, **options: Any
+) -> tuple[Maze, ...]:
     """Reads the maze in a file, or the mazes in a folder's map files in the order of their names.
 
         >>> train = mazebench.make_vec("local", 64, mazes=mazebench.read_mazes("plans"))
@@ -61,17 +67,21 @@ def read_mazes(path: str | pathlib.Path, size: int | None = None, **options: Any
 
     Args:
       path: of the file or folder.
-      size: as `read_maze` takes it.
+      size: as `read_maze` takes it; likewise the radius.
       **options: those of `mazebench.maps.maze_options.ReadOptions`.
 
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return tuple(read_maze(file, size, **options) for file in _files(pathlib.Path(path).expanduser()))
+    return tuple(read_maze(file, size, radius=radius, **options) for file in _files(pathlib.Path(path).expanduser()))
 
 
 def read_with_older(
-    path: str | pathlib.Path, shown: str | pathlib.Path, options: ReadOptions, is_aligned: bool = False
+    path: str | pathlib.Path,
+    shown: str | pathlib.Path,
+    options: ReadOptions,
+    is_aligned: bool = False,
+    radius: float = SLIDER_RADIUS,
 ) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...]]:
     """Reads the maze in a file or those in a folder, and their older maps: likewise, or one that is that of all.
 
@@ -84,21 +94,23 @@ def read_with_older(
     mazes, older = [], []
     for file, older_file in zip(files, one_for_each(older_files, len(files)), strict=True):
         newer = _read_grid(file, None, options)
-        located = locate_maze(newer, options, file.stem)
+        located = locate_maze(newer, options, file.stem, radius)
         mazes.append(located.maze)
         grid = _read_grid(older_file, None, options)
         older.append(lay_on(grid, newer, located, options, f"shown {older_file}", is_aligned))
     return tuple(mazes), tuple(older)
 
 
-def read_located(path: str | pathlib.Path, size: int | None = None, **options: Any) -> LocatedMaze:
+def read_located(
+    path: str | pathlib.Path, size: int | None = None, *, radius: float = SLIDER_RADIUS, **options: Any
+) -> LocatedMaze:
     """Reads the maze in one file, as `read_maze` does, and its place in the frame of the map.
 
     A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
     if (x0, y0, yaw) is the origin that is returned.
     """
     path, reading = pathlib.Path(path).expanduser(), ReadOptions.of(options)
-    located = locate_maze(_read_grid(path, size, reading), reading, path.stem)
+    located = locate_maze(_read_grid(path, size, reading), reading, path.stem, radius)
     if size not in (None, located.maze.size):
         raise InputError(f"{path}: expected a maze of size {size}, found size {located.maze.size}")
     return located

@@ -53,7 +53,7 @@ def described(options: TaskOptions) -> str:
 
 def own_in_words(options: TaskOptions) -> tuple[str, ...]:
     """Returns a user's choices besides the mazes: the body, the size of a cell, start and goal, noise on the senses."""
-    body = () if options.body == SLIDER.name else (f"body {options.body}",)
+    body = () if options.body == SLIDER.name else (f"body {options.driven_body.name}",)
     scale = () if options.cell_size in (None, 1) else (f"cells of {options.cell_size:g} m",)
     shown = () if options.shown in (None, options.mazes) else ("an older map shown",)
     ends = (f"{name} {end}" for name in ENDS if (end := getattr(options, name)) is not None)

@@ -230,10 +230,11 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
         return (maze,), None if asked.shown is None else (load_older(asked.shown, mazes),)
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
+    radius = asked.driven_body.radius
     if asked.shown is None:
-        mazes = read_mazes(mazes, asked.size, **dataclasses.asdict(asked.reading))
+        mazes = read_mazes(mazes, asked.size, radius=radius, **dataclasses.asdict(asked.reading))
     else:
-        mazes, shown = read_with_older(mazes, asked.shown, asked.reading, asked.align)
+        mazes, shown = read_with_older(mazes, asked.shown, asked.reading, asked.align, radius)
     kept = _playable(mazes, functools.partial(_check_maze, asked))
     return tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept)
 

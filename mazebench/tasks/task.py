@@ -21,7 +21,7 @@ from mazebench.tasks.sensors import SENSORS, require_sensors_of_options
 from mazebench.tasks.task_options import DRAWN_KINDS, HIERARCHICAL, LOCAL, NUM_DRAWN, TaskOptions
 from mazebench.tasks.time_limit import default_time_limit
 from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS, cells_of
-from mazebench.world.bodies import BODIES, SLIDER, Body
+from mazebench.world.bodies import SLIDER, Body
 
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
@@ -30,7 +30,8 @@ NOT_IN_EVALUATIONS = ("fresh", *_NOT_VARIED, "context_size")  # agents choose th
 
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
 # Options by which mazes are read or drawn.
-_OF_MAZES = {"task", "size", "split", "mazes", "shown", "align", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions)}
+_OF_MAZES = {"task", "size", "split", "mazes", "shown", "align", "kinds", "num_mazes", "fresh", "body"}
+_OF_MAZES |= set(fields_of(ReadOptions))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,7 +116,7 @@ class Task:
     @property
     def body(self) -> Body:
         """The body that is driven."""
-        return BODIES[self.options.body]
+        return self.options.driven_body
 
     @property
     def levels(self) -> tuple[int, ...]:
@@ -194,7 +195,7 @@ def resolve(
         wanted = None if asked.options.track is not None else context_size_of(asked.size)
         return asked.replace(context_size=wanted)
     require_sensors_of_options(asked.sensors, asked.changed().items())  # here, since agents add sensors of their own
-    arena, body = arena or arena_of(asked), BODIES[asked.body]
+    arena, body = arena or arena_of(asked), asked.driven_body
     if arena.cell_size < 2 * body.reach:
         raise InputError(
             f"body {body.name!r}: expected cells of at least {2 * body.reach:g} m, through which it passes, "

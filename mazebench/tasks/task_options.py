@@ -34,7 +34,9 @@ from mazebench.tasks.perturbations.odometry import OdometryNoise
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, LIDAR, NOISE_OF_SENSORS, SENSORS, AllSensorOptions
 from mazebench.tasks.streams import ADRIFT, BUILDING
 from mazebench.tasks.tracks import LEVELS, TRACKS
-from mazebench.world.bodies import BODIES, SLIDER
+from mazebench.world.bodies import BODIES, SLIDER, Body
+from mazebench.world.bodies.described import body_of
+from mazebench.world.bodies.described import to_json as described_body
 from mazebench.world.looks import PICTURES
 
 LOCAL, HIERARCHICAL = "local", "hierarchical"
@@ -197,7 +199,13 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         ),
     ] = None
 
-    body: Annotated[str, OneOf(*BODIES), Doc("The body that is driven.")] = SLIDER.name
+    body: Annotated[
+        Any,
+        ReadBy(body_of),
+        Doc(
+            f"The body that is driven: {', '.join(BODIES)}, or the path of a YAML file that describes one of your own."
+        ),
+    ] = SLIDER.name
 
     # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
     map_flip: FlipShare = 0.0
@@ -267,6 +275,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
             values["mazes"] = one_line(own) if isinstance(own, str) else [described_maze(maze) for maze in own]
         if isinstance(self.shown, str):
             values["shown"] = one_line(self.shown)
+        if "body" in values:
+            values["body"] = described_body(self.body)
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     # What they mean.
@@ -276,6 +286,11 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         """The options of reading mazes; a start or a goal chooses the area, unless it is given."""
         values = {name: getattr(self, name) for name in fields_of(ReadOptions)}
         return ReadOptions(**values | {"area": self.area or self.start or self.goal})
+
+    @property
+    def driven_body(self) -> Body:
+        """The body that is driven."""
+        return self.body if isinstance(self.body, Body) else BODIES[self.body]
 
     @property
     def track(self) -> str | None:

@@ -46,12 +46,20 @@ def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     return pose[:2] + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
+def ahead_of(pose: np.ndarray, offset: float) -> np.ndarray:
+    """Returns the poses `[..., 3]` of sensors that are mounted `offset` (m) ahead of poses of bodies."""
+    if offset == 0:
+        return pose
+    x, y, yaw = np.moveaxis(pose, -1, 0)
+    return np.stack([x + offset * np.cos(yaw), y + offset * np.sin(yaw), yaw], axis=-1)
+
+
 class Lidar:
     """The range sensor in some mazes of one size, whose cells have one size."""
 
-    def __init__(self, mazes: Mazes, max_range: float = MAX_RANGE):
-        """Sees as far as `max_range` (m)."""
-        self._max_range, self._cell_size = max_range, mazes[0].cell_size
+    def __init__(self, mazes: Mazes, max_range: float = MAX_RANGE, offset: float = 0.0):
+        """Sees as far as `max_range` (m) from a point `offset` (m) ahead of the bodies' centres."""
+        self._max_range, self._cell_size, self._offset = max_range, mazes[0].cell_size, offset
         self._walls = MazeRows(lambda number: (mazes[number].walls,))
 
     def ranges(self, maze: np.ndarray, pose: np.ndarray) -> np.ndarray:
@@ -65,5 +73,6 @@ class Lidar:
         """
         from mazebench.world.ray_kernels import cast  # which needs numba
 
+        pose = ahead_of(pose, self._offset)
         places = self._walls.places(maze)  # before the walls are read, which it may replace
         return cast(*self._walls.arrays, places, pose, NUM_RAYS, self._cell_size, self._max_range)

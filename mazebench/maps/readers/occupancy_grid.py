@@ -165,12 +165,12 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str, radius: fl
 
     # Which pixels can't be driven on, and the cells made of them, along the walls if these are slanted.
     picture, turn, all_states = _known_part(grid), 0.0, grid.states
-    if not grid.is_cells and _fewest_pixels(grid.resolution) > 1:
+    if not grid.is_cells and _fewest_pixels(grid.resolution, radius) > 1:
         turn = turn_of_walls(picture.states == FREE, picture.states == OCCUPIED, grid.resolution)
     grid = _turned(picture, turn) if turn else grid
     part = _known_part(grid)
     blocked = blocked_pixels(part.states, options, grid.resolution)
-    pixels = 1 if grid.is_cells else _cell_pixels(blocked, grid.resolution, options, name)
+    pixels = 1 if grid.is_cells else _cell_pixels(blocked, grid.resolution, options, name, radius)
     cell_size = options.cell_size or round(pixels * grid.resolution, 9)
     rim = _rim(picture, part, cell_size) if turn else None
     cells = lay_cells(blocked, pixels, rim)
@@ -400,7 +400,7 @@ def _describe_lost(
     inside = np.flatnonzero(kept)
     is_within_reach = np.array([region.width >= 2 * radius - _TIE for region in lost])
     advice = {
-        "a smaller --cell-size": pixels > _fewest_pixels(picture.resolution),
+        "a smaller --cell-size": pixels > _fewest_pixels(picture.resolution, radius),
         "a smaller --inflate": options.inflate > 0,
     }
     ways = [way for way, helps in advice.items() if helps and is_within_reach.any()]
@@ -427,17 +427,17 @@ def _require_not_inverted(states: np.ndarray, name: str) -> None:
         )
 
 
-def _cell_pixels(blocked: np.ndarray, resolution: float, options: ReadOptions, name: str) -> int:
+def _cell_pixels(blocked: np.ndarray, resolution: float, options: ReadOptions, name: str, radius: float) -> int:
     """Returns the pixels on a side of a cell of `options.cell_size`.
 
-    If none is given, it is the smallest of at least `MIN_CELL_SIZE` of which a maze has enough.
+    If none is given, it is the smallest through which a body of `radius` m passes, and of which a maze has enough.
     """
-    fewest = _fewest_pixels(resolution)
+    fewest = _fewest_pixels(resolution, radius)
     if options.cell_size:
         pixels = max(round(options.cell_size / resolution), fewest)
         if abs(options.cell_size / resolution - pixels) > _TOLERANCE:
             raise InputError(
-                f"{name}: expected a cell_size of at least {MIN_CELL_SIZE} m and of a whole number of pixels of "
+                f"{name}: expected a cell_size of at least {_narrowest(radius):g} m and of a whole number of pixels of "
                 f"{resolution:g} m, such as {pixels * resolution:g}, found {options.cell_size:g}"
             )
         return pixels
@@ -449,9 +449,14 @@ def _cell_pixels(blocked: np.ndarray, resolution: float, options: ReadOptions, n
     return max(fewest, math.ceil(longest / (MAX_CHOSEN_SIZE - 3)))
 
 
-def _fewest_pixels(resolution: float) -> int:
-    """Returns the pixels on a side of the smallest cells of at least `MIN_CELL_SIZE`."""
-    return max(1, math.ceil(MIN_CELL_SIZE / resolution - _TOLERANCE))
+def _narrowest(radius: float) -> float:
+    """Returns the metres on a side of the smallest cells through which a body passes, at least `MIN_CELL_SIZE`."""
+    return MIN_CELL_SIZE + 2 * max(0.0, radius - SLIDER_RADIUS)
+
+
+def _fewest_pixels(resolution: float, radius: float) -> int:
+    """Returns the pixels on a side of these cells."""
+    return max(1, math.ceil(_narrowest(radius) / resolution - _TOLERANCE))
 
 
 def blocked_pixels(states: np.ndarray, options: ReadOptions, resolution: float) -> np.ndarray:

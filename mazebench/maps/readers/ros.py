@@ -23,13 +23,13 @@ from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.readers.image import read_picture, to_gray
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, Pose
-from mazebench.storage.files import open_whole, read_at_most
+from mazebench.storage.files import open_whole
+from mazebench.storage.yaml_files import load_yaml
 
 ROS_SUFFIXES = (".yaml", ".yml")
 _MASK_NAME = re.compile(
     r"keep[-_]?out|(^|[-_.])speed([-_.]?(mask|limit|zone|filter)|[-_.]|$)|[-_.]mask$"
 )  # of Nav2's filters
-_MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
 _SAVED_SHADES = 3  # the commonest ones of a map that map_saver wrote, also if it was retouched since
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
@@ -39,30 +39,6 @@ _Share = Annotated[float, Interval(ge=0, le=1)]
 # difference of shades across an edge's pixels, or between a thin line and what is around it.
 _SOFT, _DARK, _CONTRAST = 6, 51, 16
 _MOSTLY_DARK = 0.8  # share of walls from which a floor plan is light on dark; mazes of corridors have up to 0.6
-
-
-class _Loader(yaml.SafeLoader):
-    """Reads YAML without aliases, by which a few bytes can stand for a content of any size."""
-
-    def compose_node(self, *place: Any) -> yaml.Node | None:
-        """Composes the node of the next event."""
-        if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError("an alias, which no such file needs")
-        return super().compose_node(*place)
-
-
-def _load_yaml(path: pathlib.Path) -> Any:
-    """Returns the content of a YAML file.
-
-    Raises:
-      InputError: if it can't be read or is no YAML.
-    """
-    text = read_at_most(path, _MAX_BYTES, "map")
-    try:
-        return yaml.load(text, _Loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: of a date that does not exist
-        found = " ".join(str(error).split())[:120]
-        raise InputError(f"{path}: expected the YAML file of a ROS map, found {found}") from error
 
 
 class _Metadata(pydantic.BaseModel):
@@ -205,7 +181,7 @@ def read_occupancy(path: pathlib.Path) -> OccupancyGrid:
 def is_map(path: pathlib.Path) -> bool:
     """Returns whether a YAML file names a picture, as a map does; one that can't be read may be a map."""
     try:
-        content = _load_yaml(path)
+        content = load_yaml(path, "ROS map")
     except InputError:
         return True
     return isinstance(content, dict) and "image" in content
@@ -262,7 +238,7 @@ def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: Pose = (0.0, 0.0
 
 
 def _read_metadata(path: pathlib.Path) -> _Metadata:
-    content, expected = _load_yaml(path), f"{path}: expected the YAML file of a ROS map"
+    content, expected = load_yaml(path, "ROS map"), f"{path}: expected the YAML file of a ROS map"
     if not isinstance(content, dict):
         found = "an empty file" if content is None else f"no keys but {_shown(content)}"
         raise InputError(f"{expected}, with keys such as image and resolution, found {found}")

@@ -37,10 +37,16 @@ class CameraOptions(SensorOptions):
     camera_fov: Annotated[
         float, Interval(ge=10, le=360), Doc("Degrees that a picture is wide; above 120, columns are at equal angles.")
     ] = _CAMERA.fov
-    camera_height: Annotated[float, Interval(ge=0.1, le=0.9), Doc("Metres above the floor.")] = _CAMERA.height
-    camera_offset: Annotated[float, Interval(ge=-0.15, le=0.15), Doc("Metres ahead of the body's centre.")] = (
-        _CAMERA.offset
-    )
+    camera_height: Annotated[
+        float | None,
+        Interval(ge=0.1, le=0.9),
+        Doc("Metres above the floor; the body's if not given, 0.45 of the slider."),
+    ] = None
+    camera_offset: Annotated[
+        float | None,
+        Interval(ge=-0.15, le=0.15),
+        Doc("Metres ahead of the body's centre; the body's if not given, 0.12 of the slider."),
+    ] = None
     camera_pitch: Annotated[
         float, Interval(ge=-45, le=45), Doc("Degrees that the camera looks up; walls stay upright.")
     ] = _CAMERA.pitch
@@ -56,7 +62,10 @@ class CameraOptions(SensorOptions):
     @property
     def camera(self) -> Camera:
         """The camera of the sensors `egocentric`, `depth` and `labels`."""
-        return Camera(self.camera_size, self.camera_fov, self.camera_height, self.camera_offset, self.camera_pitch)
+        body = self.driven_body
+        height = body.camera_height if self.camera_height is None else self.camera_height
+        offset = body.camera_offset if self.camera_offset is None else self.camera_offset
+        return Camera(self.camera_size, self.camera_fov, height, offset, self.camera_pitch)
 
 
 class CameraSensor(Sensor[CameraOptions]):

@@ -66,7 +66,7 @@ class LidarOptions(SensorOptions):
 
 
 class LidarSensor(Sensor[LidarOptions]):
-    """A range sensor at the body's centre. It sees the walls only, neither the body nor the goal marker."""
+    """A range sensor at the body's centre, or where the body has it. It sees the walls only, neither body nor goal."""
 
     options = LidarOptions
     noise = "lidar_noise"
@@ -85,7 +85,7 @@ class LidarSensor(Sensor[LidarOptions]):
         self._model = options.lidar
         self.stream = Stream.LIDAR_NOISE if self._model.is_random else None
         self._is_exact = self._model == LidarModel(max_range=self._model.max_range)
-        self._lidar = Lidar(mazes, self._model.max_range)
+        self._lidar = Lidar(mazes, self._model.max_range, options.driven_body.lidar_offset)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, 32]` float32 by name, m: the rays of `Lidar.ranges`, as the model measures them."""

@@ -13,6 +13,7 @@ from dm_env import specs
 from mazebench.maps.drawn import Mazes
 from mazebench.options import Options, fields_of
 from mazebench.tasks.streams import Stream
+from mazebench.world.bodies import SLIDER, Body
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -23,6 +24,11 @@ class SensorOptions(Options):
     def track(self) -> str | None:
         """The name of the track; None without one."""
         return None
+
+    @property
+    def driven_body(self) -> Body:
+        """The body that the sensors are mounted on."""
+        return SLIDER
 
     @property
     def is_unseen(self) -> bool:

@@ -40,6 +40,10 @@ class Body(abc.ABC):
     top_speed: float  # m/s, of a drive
     fastest: float  # m/s, which it never exceeds, whatever its actions are
     turn_step: float  # rad, which it turns in an agent step
+    # Where sensors are: the camera above the floor and ahead of the centre, the lidar ahead of the centre.
+    camera_height: float = Camera().height  # m
+    camera_offset: float = Camera().offset  # m
+    lidar_offset: float = 0.0  # m
 
     @property
     def turn_rate(self) -> float:
@@ -123,9 +127,8 @@ class Body(abc.ABC):
         body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
 
         # The camera looks along the body's x axis: its right is -y, its up is z. The nose is below its view.
-        camera = Camera()
-        eye = [camera.offset, 0, camera.height - self.height / 2]
-        body.add_camera(name="egocentric", pos=eye, xyaxes=[0, -1, 0, 0, 0, 1], fovy=camera.fov)
+        eye = [self.camera_offset, 0, self.camera_height - self.height / 2]
+        body.add_camera(name="egocentric", pos=eye, xyaxes=[0, -1, 0, 0, 0, 1], fovy=Camera().fov)
         # Nearer to the body, it looks down more steeply.
         pos, down = [-1.6 * behind, 0, 2.2], 0.66 * behind
         body.add_camera(name="chase", pos=pos, xyaxes=[0, -1, 0, 0.75, 0, down], fovy=60)

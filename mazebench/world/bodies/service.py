@@ -12,4 +12,6 @@ SERVICE = RollingBody(
     turn_step=1.5 * STEP_TIME,
     acceleration=1.0,
     turn_acceleration=3.0,
+    camera_height=0.8,
+    camera_offset=0.3,
 )

@@ -1,7 +1,8 @@
 """The TurtleBot3 of ROBOTIS, a small differential drive, as burger and as waffle.
 
-Radius, height, mass, speed and turn rate are those of its e-manual, the accelerations those of the parameters of its
-navigation package. Both are limits of each wheel pair's sum and difference, as the package sets them.
+Radius, height, mass, speed and turn rate are those of its e-manual. The accelerations are those of the dynamic window
+in its package turtlebot3_navigation. The lidar is where its model for ROS, turtlebot3_description, has it. A burger
+comes without a camera, and we put one in front.
 """
 
 import dataclasses
@@ -18,6 +19,9 @@ TURTLEBOT3 = RollingBody(
     turn_step=2.84 * STEP_TIME,
     acceleration=2.5,
     turn_acceleration=3.2,
+    camera_height=0.12,
+    camera_offset=0.05,
+    lidar_offset=-0.032,
 )
 TURTLEBOT3_WAFFLE = dataclasses.replace(
     TURTLEBOT3,
@@ -27,4 +31,7 @@ TURTLEBOT3_WAFFLE = dataclasses.replace(
     mass=1.8,
     top_speed=0.26,
     turn_step=1.82 * STEP_TIME,
+    camera_height=0.1,
+    camera_offset=0.073,
+    lidar_offset=-0.064,
 )
