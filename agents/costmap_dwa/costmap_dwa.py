@@ -71,7 +71,7 @@ class CostmapDWA(Agent):
             interface.require_sensor("lidar", "costmap-dwa")
         self._reach = interface.lidar.max_range  # type: ignore[union-attr]
         self._width = interface.size * interface.cell_size
-        self._limits = limits_of(interface.body)
+        self._limits, self._offset = limits_of(interface.body), interface.body.lidar_offset
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -119,7 +119,8 @@ class CostmapDWA(Agent):
         """Returns the action after a state `[12]` and a scan `[R]`."""
         x, y = (min(max(float(values[axis]), 0.01), self._width - 0.01) for axis in (X, Y))
         yaw, limits = float(values[YAW]), self._limits
-        robot.costmap.sense(x, y, yaw, ranges, self._reach)
+        lidar_x, lidar_y = x + self._offset * math.cos(yaw), y + self._offset * math.sin(yaw)
+        robot.costmap.sense(lidar_x, lidar_y, yaw, ranges, self._reach)
 
         if robot.recovery:
             return robot.recovery.pop()
