@@ -25,7 +25,9 @@ _WAY_AHEAD = 7.0  # m of the path
 _STEPS_AHEAD = 7  # that are planned
 _STEPS_AHEAD_TURNING = 11  # if the body can't strafe: a quarter turn takes 4 or 5
 _STEPS_USED = 4  # of them
-_METRES_AHEAD, _FEWEST_AHEAD = 1.2, 12  # of a rolling body: the way and the steps that are planned, at least
+# Of a rolling body, which brakes and turns slowly: the steps and the metres that are planned at least, the metres that
+# are used of them, and the width of the beam.
+_ROLLING_STEPS, _ROLLING_AHEAD, _ROLLED, _ROLLING_WIDTH = 24, 1.2, 0.4, 8
 _WIDTH = 4  # of the beam, for each heading
 _INSIDE = 0.05  # share of a cell, from the edges of the one that the body is in
 _FASTEST = 1.1  # times the top speed; more is an error of the observation
@@ -97,11 +99,13 @@ class Drive:
             velocity = np.clip(np.array(body.velocity()) * cell_size, -fastest, fastest).tolist()
             course = make_course(body.model, walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
             steps, used = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING, _STEPS_USED
+            width = _WIDTH
             if not body.model.strafes:
-                steps = max(_FEWEST_AHEAD, math.ceil(_METRES_AHEAD / (body.model.top_speed * STEP_TIME)))
-                used = steps // 3
+                step = body.model.top_speed * STEP_TIME
+                steps, used = max(_ROLLING_STEPS, math.ceil(_ROLLING_AHEAD / step)), max(used, round(_ROLLED / step))
+                width = _ROLLING_WIDTH
             motions = Motions(tuple(velocity), body.turn)
-            actions, poses = quickest(course, (x, y), motions, body.yaw, steps, _WIDTH, strafes)
+            actions, poses = quickest(course, (x, y), motions, body.yaw, steps, width, strafes)
             self.actions, self.path = actions[:used], ahead
             shift = corner * cell_size
             self.points = [(body.x * cell_size, body.y * cell_size), *(tuple(shift + each[:2]) for each in poses)]

@@ -21,8 +21,8 @@ NO_WALLS = np.zeros((3, 3), dtype=bool)
 BEARINGS = np.array([0.0, math.pi, math.pi / 2, -math.pi / 2])  # of the four drives, from the heading
 # Of a contact of 1 kg, computed from its time constant and its damping ratio as MuJoCo's documentation of solref has
 # it, for an impedance of 0.95.
-_IMPEDANCE = 0.95
-CONTACT_DAMPING = 2 / (_IMPEDANCE * CONTACT_SOLREF[0])
+IMPEDANCE = 0.95
+CONTACT_DAMPING = 2 / (IMPEDANCE * CONTACT_SOLREF[0])
 CONTACT_STIFFNESS = (CONTACT_DAMPING / (2 * CONTACT_SOLREF[1])) ** 2
 
 
@@ -134,4 +134,4 @@ def _contact_force(motion: Motion, depth: float, speed: float, force: float) -> 
     if depth <= 0:
         return 0.0
     push = motion.contact_damping * speed + motion.contact_stiffness * depth + force
-    return max(_IMPEDANCE * push, 0.0)
+    return max(IMPEDANCE * push, 0.0)

@@ -15,15 +15,17 @@ import numpy as np
 from mazebench.constants import NUM_ACTIONS, STEP_TIME
 from mazebench.kernels import compiled
 
+from .motion import push_of_walls
 from .moving_body import STRAFE_LEFT, STRAFE_RIGHT, Point
 from .quickest import Course, way_left_at
 from .rolling import RollingMotion, rolled
 
 _SECTORS = 16  # of headings
-_WIDTH = 10  # states of a beam for each sector
+_WIDTH, _NARROWEST, _WIDEST = 250, 10, 60  # states of a beam for each sector: for each metre of a step, and bounds
 _BEHIND = 1.0  # m that a state may be behind the best one
 _SAME = 0.25  # of the way of a command at the top speed, between states that count as the same one
 _DRIVEN_WEIGHT = 0.3  # of a metre that was driven against one that is left
+_TOUCHED = 2.0  # steps at the top speed, as whose way a step counts after which a wall pushes: it is hard to foresee
 _ASKEW_WEIGHT = 0.5  # of the time that a turn along the way takes, in metres at the top speed
 _ARRIVED = -1e9  # added to the score of a state in the goal cell: lower than all others
 _HELD = 0.08  # m, about as long as a command is held at the top speed, at least two steps
@@ -43,7 +45,7 @@ def quickest_roll(
     yaw: float,
     turn: float,
     num_steps: int = 0,
-    width: int = _WIDTH,
+    width: int = 0,
     arcs: bool = True,
     held: int = 0,
 ) -> tuple[list[int], list[tuple[float, float, float]]]:
@@ -58,14 +60,16 @@ def quickest_roll(
       yaw: of the body, in rad.
       turn: its yaw rate, in rad/s.
       num_steps: that are planned at most; 0 for as many as said above.
-      width: states of a beam for each sector of headings.
+      width: states of a beam for each sector of headings; 0 for the more the faster it is, since it takes fewer steps.
       arcs: whether the body drives arcs.
       held: steps of a command; 0 for as many as lead on by some centimetres, at least two.
     """
     motion, way_left = course.motion, way_left_at(course, *point)
+    width = width or min(max(_NARROWEST, round(_WIDTH * motion.top_speed * STEP_TIME)), _WIDEST)
     held = held or max(2, round(_HELD / (motion.top_speed * STEP_TIME)))
     expected = way_left / (motion.top_speed * STEP_TIME) if way_left < np.inf else 0.0
-    num_commands = math.ceil((num_steps or int(2 * expected) + 49) / held)
+    turning = (math.pi / motion.turn_rate + motion.turn_rate / motion.turn_acceleration) / STEP_TIME
+    num_commands = math.ceil((num_steps or int(2 * expected + turning) + 49) / held)
     beams = np.zeros((num_commands + 1, width * _SECTORS), _State)
     first = beams[0, 0]
     first["x"], first["y"], first["vx"], first["vy"], first["yaw"], first["turn"] = *point, *velocity, yaw, turn
@@ -120,6 +124,9 @@ def _roll(course: Course, state: Any, child: Any, held: int) -> None:
             course.motion, course.walls, course.cell_size, x, y, vx, vy, yaw, turn, child.action
         )
         child.driven += math.hypot(x - before_x, y - before_y)
+        push_x, push_y = push_of_walls(course.motion, course.walls, course.cell_size, x, y, 0.0, 0.0, 0.0, 0.0)
+        if push_x != 0 or push_y != 0:
+            child.driven += _TOUCHED * course.motion.top_speed * STEP_TIME
         if int(x / course.cell_size) == course.goal_x and int(y / course.cell_size) == course.goal_y:
             has_arrived, child.steps = True, step + 1
             break

@@ -12,7 +12,10 @@ from mazebench.kernels import compiled
 from mazebench.world.bodies import RollingBody
 from mazebench.world.bodies.rolling import FOLLOWING, GRIP, SHARES
 
-from .motion import CONTACT_DAMPING, CONTACT_STIFFNESS, push_of_walls
+from .motion import CONTACT_DAMPING, CONTACT_STIFFNESS, IMPEDANCE, push_of_walls
+
+# A capsule touches a wall by its two ends: how much more two contacts push than the one of `push_of_walls`.
+_CONTACTS = 2 / (1 + IMPEDANCE)
 
 
 class RollingMotion(NamedTuple):
@@ -60,8 +63,8 @@ def rolled(
         push_x, push_y = push_of_walls(motion, walls, cell_size, x, y, vx, vy, force_x, force_y)
 
         # MuJoCo's integrator implicit takes the dampings of the next velocity.
-        pull += cosine * push_x + sine * push_y
-        hold += cosine * push_y - sine * push_x
+        pull += _CONTACTS * (cosine * push_x + sine * push_y)
+        hold += _CONTACTS * (cosine * push_y - sine * push_x)
         ahead += PHYSICS_TIMESTEP * pull / (1 + PHYSICS_TIMESTEP * gain)
         aside += PHYSICS_TIMESTEP * hold / (1 + PHYSICS_TIMESTEP * GRIP)
         vx, vy = cosine * ahead - sine * aside, sine * ahead + cosine * aside
