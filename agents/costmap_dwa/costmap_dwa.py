@@ -15,6 +15,7 @@ from mazebench.errors import UnplayableError
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
 from mazebench.world.angles import wrap_angle
 from mazebench.world.bodies import Body
+from mazebench.world.ray_casting import LidarModel
 
 from ..robot.cells import marked_cell
 from .costmap import INFLATION, Costmap
@@ -67,9 +68,9 @@ class CostmapDWA(Agent):
         """Raises `UnplayableError` if the pose is odometry, by which it can't find its place on the map."""
         if interface.odometry_noise > 0:
             raise UnplayableError("agent 'costmap-dwa': expected the pose on the map, found odometry with noise")
-        if interface.lidar is None:
+        if interface.sensors:
             interface.require_sensor("lidar", "costmap-dwa")
-        self._reach = interface.lidar.max_range  # type: ignore[union-attr]
+        self._reach = (interface.lidar or LidarModel()).max_range
         self._width = interface.size * interface.cell_size
         self._limits, self._offset = limits_of(interface.body), interface.body.lidar_offset
 

@@ -17,7 +17,8 @@ from mazebench.kernels import compiled
 from .costmap import cost
 
 _NUM_SPEEDS, _NUM_TURNS = 8, 21
-_PATH, _GOAL, _NEAR_WALLS = 32.0, 24.0, 5.0  # weights a metre, and of the costmap's cost
+_PATH, _GOAL, _HEADING, _NEAR_WALLS = 32.0, 24.0, 1.0, 5.0  # weights per m, per rad, and of the costmap's cost
+_TARGET = 3  # points ahead on the path, to which it should head
 _NEARER = 0.002  # m, by which a robot that is too near to a wall may come nearer
 
 
@@ -86,7 +87,10 @@ def best_velocities(
             off, left_of_path = _to_path(path, x, y)
             nose_off, nose_left = _to_path(path, nose_x, nose_y)
             near_walls = cost(near, limits.radius)
+            target_x, target_y = path[min(_TARGET, len(path) - 1)]
+            heading = abs((math.atan2(target_y - y, target_x - x) - yaw + math.pi) % (2 * math.pi) - math.pi)
             score = _PATH * (off + nose_off) + _GOAL * (left_of_path + nose_left) + _NEAR_WALLS * near_walls
+            score += _HEADING * heading
             if score < least:
                 least, best_speed, best_rate, is_any = score, v, w, True
     return best_speed, best_rate, is_any, here < limits.radius
