@@ -55,9 +55,10 @@ def best_velocities(
       corner: m, its left and upper end.
       cell: m.
     """
-    speed, rate = velocities
+    speed = min(max(velocities[0], 0.0), limits.top_speed)
+    rate = min(max(velocities[1], -limits.turn_rate), limits.turn_rate)
     gain, twist = limits.acceleration * STEP_TIME, limits.turn_acceleration * STEP_TIME
-    slowest, fastest = max(0.0, min(speed - gain, limits.top_speed)), min(limits.top_speed, max(0.0, speed + gain))
+    slowest, fastest = max(0.0, speed - gain), min(limits.top_speed, speed + gain)
     right, left = max(-limits.turn_rate, rate - twist), min(limits.turn_rate, rate + twist)
     num_steps = max(8, math.ceil(limits.horizon * limits.top_speed / cell))
     step = limits.horizon / num_steps
