@@ -27,6 +27,7 @@ from benchmarks.results.kept import (
     RECALL_AGENTS,
     RECALL_SETTINGS,
     SUCCESS,
+    TURTLEBOT3,
     WORST_TENTH,
     Kept,
     ceilings,
@@ -47,7 +48,7 @@ PAGES = (
     "README.md",
     *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
-    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
+    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy", "costmap_dwa")),
     *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
 )
 
@@ -182,6 +183,14 @@ _MAP_POLICY = {
     for track, level, look in (
         ("building", 1, "plain"), ("building", 1, "varied"), *(("rebuilt", level, "plain") for level in LEVELS)
     )
+}  # fmt: skip
+_TURTLEBOT3 = {
+    f"{text}, `{agent}`": (f"{TURTLEBOT3}/{agent}", setting)
+    for setting, text in (
+        *((f"rebuilt-{level}", f"`rebuilt` {level}") for level in LEVELS),
+        ("right", "`real`, right map"), ("changed-1", "`real`, changed 1"), ("years", "`real`, years"),
+    )
+    for agent in ("costmap-dwa", "navigator")
 }  # fmt: skip
 _IN_WORDS = ("building-1", "rebuilt-2", "adrift-1", "adrift-2")  # the settings of the suites `llm` and `llm-dev`
 # The numbers of simulations of mmn in evaluation.
@@ -541,6 +550,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
         {metric.title: ("navigator", metric.name, _KINDS) for metric in (SUCCESS_RATE, *ON_TIMES, SPL)}, kept
     ),
     "map-policy": lambda kept: by_row("setting", _MAP_POLICY, ("success_rate", ON_TIME_125, ON_TIME_2), kept),
+    TURTLEBOT3: lambda kept: by_row("setting", _TURTLEBOT3, ("success_rate", ON_TIME_125, ON_TIME_2, "spl"), kept),
     "mmn-search": lambda kept: by_distance("simulations", _SEARCHES, "success_rate", (6, 8, 10, 12), kept),
     LLM_DEV: plans_in_words,
     "tracks-navigator-kinds": lambda kept: by_track(
