@@ -14,11 +14,11 @@ from mazebench.kernels import compiled
 
 from ..robot.rays import in_next_cell, is_on, leaves_at, ray_from
 
-_WIDEST = 0.15  # m, the most that a cell is wide; Nav2's are 0.05 m, a ninth of them
+_WIDEST = 0.15  # m, the most that a cell is wide; Nav2's are 0.05 m, of which a maze has many more
 _LOCAL_CELL = 0.036  # m, the most in the window around the robot
 _INTO_WALL = 0.03  # m, by which the end of a ray lies in the cell that it marks
-INFLATION = 0.55  # m from walls, up to which cells cost more; Nav2's default, as is the next
-_SCALING = 3.0  # 1/m, the rate at which costs decay
+INFLATION = 0.55  # m from the robot's edge, up to which walls cost
+_SCALING = 3.0  # 1/m, the rate at which costs decay, as in Nav2's example parameters
 
 
 class Costmap:
