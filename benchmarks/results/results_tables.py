@@ -48,7 +48,7 @@ PAGES = (
     "README.md",
     *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
-    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy", "costmap_dwa")),
+    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
     *(f"docs/environments/{name}.md" for name in (*TRACKS, "local", "hierarchical")),
 )
 
@@ -186,10 +186,9 @@ _MAP_POLICY = {
 }  # fmt: skip
 _TURTLEBOT3 = {
     f"{text}, `{agent}`": (f"{TURTLEBOT3}/{agent}", setting)
-    for setting, text in (
-        *((f"rebuilt-{level}", f"`rebuilt` {level}") for level in LEVELS),
-        ("right", "`real`, right map"), ("changed-1", "`real`, changed 1"), ("years", "`real`, years"),
-    )
+    for setting, text in {
+        "rebuilt-2": "`rebuilt` 2", "changed-1": "`real`, changed 1", "years": "`real`, years"
+    }.items()
     for agent in ("costmap-dwa", "navigator")
 }  # fmt: skip
 _IN_WORDS = ("building-1", "rebuilt-2", "adrift-1", "adrift-2")  # the settings of the suites `llm` and `llm-dev`
