@@ -12,6 +12,7 @@ from simple_mazes import field
 import mazebench
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
+from mazebench.evaluation.suites import run_suite
 from mazebench.maps.maze import Maze
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.readers.ros import write_ros_map
@@ -144,3 +145,9 @@ def test_time_limits_follow_the_speed():
     # A metre takes 29 steps of 0.035 m, a quarter turn 9; for the service robot 7 of 0.16 m, and 10.
     assert default_time_limit(20, 1.0, BODIES["turtlebot3"], track="building") == (29 + 9) * 20 + 29 * 25
     assert default_time_limit(20, 1.0, BODIES["service"], track="building") == (7 + 10) * 20 + 7 * 25
+
+
+def test_a_suite_is_played_with_a_body(tmp_path):
+    out = tmp_path / "suite"
+    summaries = run_suite("llm-dev", ["random"], out, body="service")
+    assert {summary.task.body for summary in summaries} == {"service"}

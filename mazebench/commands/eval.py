@@ -55,7 +55,7 @@ def evaluate(
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
     if suite is not None:
-        own = (*fields_of(TaskOptions), *EPISODES)
+        own = {*fields_of(TaskOptions), *EPISODES} - {"body"}
         if named := [name for name in values if name in own]:
             raise InputError(f"the suite {suite!r} has evaluations of its own; found --{named[0].replace('_', '-')}")
     run = RunOptions(**options_in(values, RunOptions))
@@ -91,7 +91,7 @@ def evaluate(
                     summaries = [run_evaluation(options, folder, run, show)]
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
-                    summaries = run_suite(suite, agents, folder, run, show, **chosen)
+                    summaries = run_suite(suite, agents, folder, run, show, body=task.body, **chosen)
             if suite is None:
                 print_summary(summaries[0])
             else:

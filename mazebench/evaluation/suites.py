@@ -27,6 +27,7 @@ from mazebench.storage.json_files import write_json
 from mazebench.tasks.streams import ADRIFT, BUILDING, REBUILT
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.bodies import SLIDER
 from mazebench.world.looks import VARIED
 
 _DEFAULT_RUN = RunOptions()
@@ -152,6 +153,7 @@ def run_suite(
     checkpoint: str | None = None,
     seed: int = 0,
     overrides: Mapping[str, str] | None = None,
+    body: Any = SLIDER.name,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -166,6 +168,7 @@ def run_suite(
       checkpoint: of a single agent.
       seed: of what the agents draw.
       overrides: values of the config of a single agent.
+      body: what is driven, as the option of `TaskOptions` has it.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -178,7 +181,7 @@ def run_suite(
     out = out.absolute()  # agents may change the working folder
     if (checkpoint is not None or overrides) and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint or --set, found {len(agents)}")
-    parts = {part.name: part for part in SUITES[suite]}
+    parts = {part.name: dataclasses.replace(part, task=part.task.replace(body=body)) for part in SUITES[suite]}
 
     def planned(agent: str, part: Part) -> Plan:
         plan = make_plan(

@@ -9,6 +9,7 @@ from typing import Any
 
 from mazebench.results.naming import noise_in_words
 from mazebench.results.records import Summary
+from mazebench.world.bodies import SLIDER
 
 
 @functools.cache
@@ -30,9 +31,9 @@ def printed(task: str, size: int, warped: bool = False) -> dict[str, dict[str, d
 def printed_mmn(summary: Summary) -> dict[int, float]:
     """Success rates of the paper's MMN by distance, or landmark distance, where `summary` can be held against them.
 
-    That is where it is of unseen mazes, of no track, nothing was perturbed and the senses were not noisy.
+    That is where it is of the slider and of unseen mazes, of no track, with neither perturbations nor noisy senses.
     """
     task = summary.task
-    if task.split_in_results != "eval" or not task.is_exact or noise_in_words(task):
+    if task.body != SLIDER.name or task.split_in_results != "eval" or not task.is_exact or noise_in_words(task):
         return {}
     return printed(task.task, task.size or 0).get("MMN", {}).get("success_rate", {})
