@@ -37,6 +37,7 @@ RECALL_AGENTS = ("navigator", "neural-planner")
 RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
 LLM_DEV = "llm-dev"  # the archive of the suite on `dev`, whose parts are named as those of `llm`
 REAL = "real"  # begins the names of archives of evaluations in real buildings; the group of a part is the setting
+TURTLEBOT3 = "turtlebot3"  # the archive of evaluations of this body, on tracks and in real buildings
 TOLD = "navigator-told"  # played `rebuilt` only
 # The settings whose maps lie as the mazes do, with the same doors moved: those with a true pose and registration.
 _REGISTERED = {
@@ -56,7 +57,7 @@ _COLUMNS = [
     "path_length", "waited",
 ]  # fmt: skip
 # Archives of evaluations with switches of their own, in folders ROW/SETTING: the agent is called ARCHIVE/ROW.
-_SWITCHED = ("map-policy", "mmn-search")
+_SWITCHED = ("map-policy", "mmn-search", TURTLEBOT3)
 # Archives whose agents have another name than their evaluations.
 _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",
@@ -158,12 +159,13 @@ def read_kept(folder: pathlib.Path) -> Kept:
             if archive in (RECALL, LLM_DEV):  # whose agents played settings of these names in other archives, too
                 setting = f"{setting}-{archive}"
             if archive in _SWITCHED:
-                agent, setting = f"{archive}/{folders[0]}", folders[1]
+                agent, setting = f"{archive}/{folders[0]}", group_of(folders[1])
             if archive == _RUNS:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))
             if archive.startswith(REAL):
                 agent, setting = summary.agent + archive.removeprefix(REAL), group_of(setting)
+            if archive.startswith(REAL) or archive == TURTLEBOT3:
                 lines["episode"] = lines.maze + lines.episode.astype(str)
             rates = lines.groupby("maze")[ON_TIME_125].mean()
             lines[WORST_TENTH] = lines[ON_TIME_125].where(lines.maze.isin(rates.nsmallest(-(-len(rates) // 10)).index))

@@ -27,6 +27,7 @@ from benchmarks.results.kept import (
     RECALL_AGENTS,
     RECALL_SETTINGS,
     SUCCESS,
+    TURTLEBOT3,
     WORST_TENTH,
     Kept,
     ceilings,
@@ -194,6 +195,13 @@ _MAP_POLICY = {
     for track, level, look in (
         ("building", 1, "plain"), ("building", 1, "varied"), *(("rebuilt", level, "plain") for level in LEVELS)
     )
+}  # fmt: skip
+_TURTLEBOT3 = {
+    f"{text}, `{agent}`": (f"{TURTLEBOT3}/{agent}", setting)
+    for setting, text in {
+        "rebuilt-2": "`rebuilt` 2", "changed-1": "`real`, changed 1", "years": "`real`, years"
+    }.items()
+    for agent in ("costmap-dwa", "navigator")
 }  # fmt: skip
 _IN_WORDS = ("building-1", "rebuilt-2", "adrift-1", "adrift-2")  # the settings of the suites `llm` and `llm-dev`
 # The numbers of simulations of mmn in evaluation.
@@ -572,6 +580,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
         {metric.title: ("navigator", metric.name, _KINDS) for metric in (SUCCESS_RATE, *ON_TIMES, SPL)}, kept
     ),
     "map-policy": lambda kept: by_row("setting", _MAP_POLICY, ("success_rate", ON_TIME_125, ON_TIME_2), kept),
+    TURTLEBOT3: lambda kept: by_row("setting", _TURTLEBOT3, ("success_rate", ON_TIME_125, ON_TIME_2, "spl"), kept),
     "mmn-search": lambda kept: by_distance("simulations", _SEARCHES, "success_rate", (6, 8, 10, 12), kept),
     LLM_DEV: plans_in_words,
     "tracks-navigator-kinds": lambda kept: by_track(
