@@ -141,8 +141,8 @@ class Expert:
             known = self._doors[slot] = schedule, moving, walls
         _, moving, walls = known
         way, _, end = earliest_way(walls, moving, cell, goal, step, self._mazes[0].cell_size)
-        if not way:  # off every way
-            return self._mazes[number].walls, goal, False, (number, goal)
+        if not way:  # closed in for good, as a learner may be that strayed: the way as if all doors were open
+            return walls, goal, False, (number % len(self._mazes), goal, "open")
         on_way = sorted({int(moving.door[each]) for each in way[: end + 1]} - {-1})
         closed = walls | ((moving.door >= 0) & ~np.isin(moving.door, on_way))
         return closed, way[end], end == 0 and way[end] != goal, (number % len(self._mazes), way[end], *on_way)
