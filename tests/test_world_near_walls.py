@@ -12,6 +12,7 @@ from mazebench.maps.doors import swap_doors
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import MAX_SIZE, Maze, resized
+from mazebench.maps.moving_doors import ChangingMazes, moving_doors
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.world.bodies import SLIDER, Body
@@ -137,3 +138,19 @@ def test_a_maze_of_the_largest_size_is_played():
     observation, _ = envs.reset(seed=0)
     assert observation["context"].shape == (2, 4, 21, 21)
     assert (envs.step(np.zeros(2, dtype=int))[0]["lidar"] > 0).all()
+
+
+def test_the_boxes_near_a_body_are_the_walls_there_whichever_doors_have_moved():
+    maze, rng = maze_of("house"), np.random.default_rng(0)
+    mazes = ChangingMazes((maze,))
+    walls, num_doors = NearWalls(mazes, 1, SLIDER), len(moving_doors(maze))
+    geoms = WallGeoms.of_model(walls.model)
+    for _ in range(200):
+        number = len(mazes) * int(rng.integers(2**num_doors))
+        stands = mazes[number].walls
+        row, column = maze.free_cells[rng.integers(len(maze.free_cells))].tolist()
+        walls.write_one(geoms, number, row * maze.size + column)
+        around = np.argwhere(np.ones((3, 3))) + (row - 1, column - 1)
+        off = np.abs(geoms.pos[0, :, None, :2] - maze.point(around))
+        is_wall = ((off < geoms.size[0, :, None, :2]).all(axis=-1) & (geoms.pos[0, :, None, 2] > 0)).any(axis=0)
+        np.testing.assert_array_equal(is_wall, stands[tuple(around.T)])

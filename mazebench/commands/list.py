@@ -13,6 +13,7 @@ def list_() -> None:
     from mazebench.tasks.sensors import SENSORS
     from mazebench.tasks.task_options import HIERARCHICAL, LOCAL
     from mazebench.tasks.tracks import TRACKS
+    from mazebench.world.bodies import BODIES
 
     ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))
     rows = {
@@ -24,6 +25,7 @@ def list_() -> None:
         "perturbed": ", ".join(PERTURBATIONS),
         "sensors": ", ".join(SENSORS),
         "actions": ", ".join((*DISCRETE, *VELOCITIES)),
+        "bodies": ", ".join(BODIES),
         "Gymnasium": f"{', '.join(ids)} and the other sizes; mazebench/Rebuilt-v{TASK_VERSION} and the other tracks",
     }
     for name, text in rows.items():

@@ -178,7 +178,7 @@ class NearWalls:
             end[first] = boxes[:, 2:]
             if isinstance(self._mazes, ChangingMazes):
                 for door in moving_doors(built.as_built):
-                    if door.is_open:
+                    if not built.walls[door.top, door.left]:  # else a box of the maze has its cells
                         end[door.top * self._size + door.left] = door.bottom, door.right
 
             # All cells of all boxes, one box after the other.
