@@ -136,8 +136,8 @@ class TestSteps:
     def test_the_info_has_what_records_and_training_need(self):
         _, info = corridor_env().reset()
         assert info.keys() == {
-            *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
-            *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
+            *("is_first", "success", "goal_reached", "steps", "waited", "path_length", "position", "yaw", "maze"),
+            *("landmark", "time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
         }
 
 

@@ -166,7 +166,10 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"task": "locl"}, r"unknown task 'locl'; available: adrift, building, hierarchical, local, rebuilt"),
+            (
+                {"task": "locl"},
+                r"unknown task 'locl'; available: adrift, building, doors, hierarchical, local, rebuilt",
+            ),
             ({"split": "test", "mazes": None}, r"unknown split 'test'; available: dev, eval, train"),
             ({"size": 14, "mazes": None}, r"unknown size 14; available: 13, 15, 17, 19, 21"),
             ({"size": 13}, r"expected mazes of size 13, found size 9"),

@@ -77,7 +77,7 @@ def test_the_user_chooses_before_the_learner_does(tmp_path):
     ("changes", "message"),
     [
         ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
-        ({"task": "hierarchical"}, "unknown task 'hierarchical'; available: adrift, building, local"),
+        ({"task": "hierarchical"}, "unknown task 'hierarchical'; available: adrift, building, doors, local"),
         ({"actions": "diff"}, "expected actions 'six' in a training, found 'diff'"),
         ({"reward": "progress"}, "agent 'mah': computes the rewards of any goal itself, found reward 'progress'"),
         ({"task": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),

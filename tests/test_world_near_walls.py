@@ -150,7 +150,7 @@ def test_the_boxes_near_a_body_are_the_walls_there_whichever_doors_have_moved():
         stands = mazes[number].walls
         row, column = maze.free_cells[rng.integers(len(maze.free_cells))].tolist()
         walls.write_one(geoms, number, row * maze.size + column)
-        around = np.argwhere(np.ones((3, 3))) + (row - 1, column - 1)
+        around = np.argwhere(np.ones((3, 3))) + np.array([row - 1, column - 1])
         off = np.abs(geoms.pos[0, :, None, :2] - maze.point(around))
         is_wall = ((off < geoms.size[0, :, None, :2]).all(axis=-1) & (geoms.pos[0, :, None, 2] > 0)).any(axis=0)
         np.testing.assert_array_equal(is_wall, stands[tuple(around.T)])
