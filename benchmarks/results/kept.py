@@ -63,6 +63,7 @@ _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",
     "tracks-neural-planner-hidden": "neural-planner trained without the map",
     "tracks-ppo-hidden": "PPO trained without the map",
+    "doors-neural-planner": "neural-planner trained on doors",
 }
 
 
