@@ -62,7 +62,7 @@ BAD_INPUT = [
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
     ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
-    ((*RANDOM, "--suite", "papr"), "unknown suite 'papr'; available: doors, doors-dev, doors-no-map, llm, llm-dev, paper, quick"),
+    ((*RANDOM, "--suite", "papr"), "unknown suite 'papr'; available: doors, doors-dev, doors-no-map, llm"),
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected map_flip 0.0, found 0.1"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--mazes", "{bad}/marked.txt"), "marked: expected '#*1@%' or a block for wall"),
