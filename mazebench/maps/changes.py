@@ -24,9 +24,10 @@ import scipy
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
+from mazebench.maps.doors import Passage
 from mazebench.maps.follower import follow
 from mazebench.maps.maze import Maze
-from mazebench.maps.passages import Passage, find_passages
+from mazebench.maps.passages import find_passages
 from mazebench.maps.search import search
 from mazebench.storage import cache
 

@@ -10,6 +10,7 @@ import functools
 import itertools
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,20 @@ from mazebench.maps.maze import Cell, Maze
 _MOST_DOORS = 4  # of a room, that are told apart: a corridor has many
 _NUM_KEPT = 128  # mazes whose doors are kept; those of 31 x 31 cells take up to 100 kB
 _MOST_CELLS_KEPT = 64 * 64  # of a maze whose doors are kept
+
+
+class Passage(NamedTuple):
+    """The cells of rows [top, bottom) and columns [left, right), all free (open) or all wall."""
+
+    top: int
+    left: int
+    bottom: int
+    right: int
+    is_open: bool
+
+    def cells(self) -> tuple[slice, slice]:
+        """Returns the rows and columns."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
 
 
 def door_slots(maze: Maze) -> np.ndarray:

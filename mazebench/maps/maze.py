@@ -192,9 +192,9 @@ class Maze:
     def _distances_from(self, source: Cell) -> np.ndarray:  # [N, N] int32, -1 at walls, which nobody may write to
         result = self._kept_distances.get(source)
         if result is None:
-            cells, ends = self._search(source)
-            result = np.full((self.size, self.size), -1, dtype=np.int32)
-            result.ravel()[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
+            from mazebench.maps.search import distances  # which needs numba
+
+            result = distances(self.walls, source[0] * self.size + source[1])
             if self.keeps_distances:
                 self._kept_distances[source] = result
         return result

@@ -10,12 +10,12 @@ import dataclasses
 import functools
 import hashlib
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from mazebench.maps.covering import Rectangle, cover
-from mazebench.maps.doors import door_slots
+from mazebench.maps.doors import Passage, door_slots
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.kinds import KINDS
 from mazebench.maps.maze import Maze
@@ -25,21 +25,7 @@ MOST_OPEN, MOST_WALLED = 26, 6
 _NUM_KEPT = 1024  # mazes with moved doors
 
 
-class Door(NamedTuple):
-    """The cells of rows [top, bottom) and columns [left, right), all free (open) or all wall in the maze."""
-
-    top: int
-    left: int
-    bottom: int
-    right: int
-    is_open: bool
-
-    def cells(self) -> tuple[slice, slice]:
-        """Returns the rows and columns."""
-        return slice(self.top, self.bottom), slice(self.left, self.right)
-
-
-def moving_doors(maze: Maze) -> tuple[Door, ...]:
+def moving_doors(maze: Maze) -> tuple[Passage, ...]:
     """Returns the doors of a maze that can move, at most `MOST_OPEN` and `MOST_WALLED`.
 
     They are the door slots of its kind, or else passages. Where there are more, those come first that leave the maze in
@@ -49,19 +35,21 @@ def moving_doors(maze: Maze) -> tuple[Door, ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def _moving_doors(maze: Maze, kind: str) -> tuple[Door, ...]:
+def _moving_doors(maze: Maze, kind: str) -> tuple[Passage, ...]:
     if kind in KINDS and len(slots := door_slots(maze)):
-        doors = [Door(row, column, row + 1, column + 1, not maze.walls[row, column]) for row, column in slots.tolist()]
+        doors = [
+            Passage(row, column, row + 1, column + 1, not maze.walls[row, column]) for row, column in slots.tolist()
+        ]
     else:
         from mazebench.maps.passages import find_passages  # which needs numba
 
-        doors = [Door(*passage) for passage in find_passages(maze.walls, maze.cell_size)]
+        doors = list(find_passages(maze.walls, maze.cell_size))
 
     # In a random order; of the open ones, those that leave the maze in one piece come first.
     rng = np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
     doors = [doors[index] for index in rng.permutation(len(doors))]
     doors.sort(key=lambda door: 2 - is_joined(moved_walls(maze.walls, [door])) if door.is_open else 3)
-    chosen: list[Door] = []
+    chosen: list[Passage] = []
     left = {True: MOST_OPEN, False: MOST_WALLED}
     taken = np.zeros(maze.walls.shape, dtype=bool)
     for door in doors:
@@ -72,7 +60,7 @@ def _moving_doors(maze: Maze, kind: str) -> tuple[Door, ...]:
     return tuple(chosen)
 
 
-def moved_walls(walls: np.ndarray, doors: Iterable[Door]) -> np.ndarray:
+def moved_walls(walls: np.ndarray, doors: Iterable[Passage]) -> np.ndarray:
     """Returns walls `[N, N]` bool in which some doors have moved."""
     moved = walls.copy()
     for door in doors:
@@ -93,7 +81,7 @@ class MovedMaze(Maze):
     """A maze some of whose doors have moved. Its free cells need not be connected, so it has no distances."""
 
     built: Maze | None = None  # before they moved
-    moved: tuple[Door, ...] = ()
+    moved: tuple[Passage, ...] = ()
 
     def __post_init__(self) -> None:
         """Trusts its walls."""

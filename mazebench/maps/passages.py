@@ -9,31 +9,17 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from mazebench.kernels import compiled
+from mazebench.maps.doors import Passage
 
 WIDEST = 2.4  # m, of an open passage
 THICKEST = 1.0  # m, of a wall in which a door can be opened; of a longer open passage, so much is closed
 DOOR = 0.9  # m, the width of a door that is opened
 DETOUR = 6.0  # m, the least length of any other way between the two sides
 _TOLERANCE = 1e-6  # cells
-
-
-class Passage(NamedTuple):
-    """A strip of cells: its first row and column, and the end of its rows and columns."""
-
-    top: int
-    left: int
-    bottom: int
-    right: int
-    is_open: bool
-
-    def cells(self) -> tuple[slice, slice]:
-        """Returns the rows and columns."""
-        return slice(self.top, self.bottom), slice(self.left, self.right)
 
 
 def find_passages(walls: np.ndarray, cell_size: float) -> tuple[Passage, ...]:

@@ -16,7 +16,7 @@ import scipy.spatial
 from mazebench.maps.maze import Cell
 from mazebench.maps.older_map import OlderMap
 from mazebench.maps.readers.occupancy_grid import points_from
-from mazebench.maps.search import search
+from mazebench.maps.search import distances, search
 from mazebench.results.records import Record
 
 # What a place is now: a wall on the way of the map, free where the map has a wall, or where trips leave the right way.
@@ -132,13 +132,10 @@ def _places(older: OlderMap, start: Cell, goal: Cell) -> list[_Place]:
 def shortest_way(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
     """Returns the cells of the shortest way on a map (`[N, N]` bool) that `path_through_walls` finds, in less time."""
     size = len(walls)
-    cells, ends = search(walls, goal[0] * size + goal[1], start[0] * size + start[1], walls.size)
-    left = np.full(walls.size, -1)
-    left[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-    grid, way = left.reshape(walls.shape), [start]
+    left, way = distances(walls, goal[0] * size + goal[1], start[0] * size + start[1]), [start]
     while (here := way[-1]) != goal:
         nexts = ((here[0] + down, here[1] + right) for down, right in _STEPS)
-        way.append(next(cell for cell in nexts if grid[cell] == grid[here] - 1))
+        way.append(next(cell for cell in nexts if left[cell] == left[here] - 1))
     return way
 
 

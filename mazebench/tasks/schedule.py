@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 
 from mazebench.constants import STEP_TIME
-from mazebench.maps.moving_doors import Door
+from mazebench.maps.doors import Passage
 from mazebench.world.bodies import Body
 
 Point = tuple[float, float]
@@ -43,7 +43,7 @@ class Schedule:
     within its braking way.
     """
 
-    doors: tuple[Door, ...]  # all of the building's that can move
+    doors: tuple[Passage, ...]  # all of the building's that can move
     times: dict[int, DoorTimes]  # by the number of the door, of those that move
     margin: float  # m, from the body's centre
     size: int  # N, cells a side of the maze

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.errors import InputError
+from mazebench.maps.doors import Passage
 from mazebench.maps.maze import Cell, Maze
-from mazebench.maps.moving_doors import Door, is_joined, moved_walls, moving_doors
+from mazebench.maps.moving_doors import is_joined, moved_walls, moving_doors
 from mazebench.tasks.perturbations.perturbation import Of, Perturbation
 from mazebench.tasks.schedule import DoorTimes
 from mazebench.tasks.streams import Stream
@@ -149,5 +150,5 @@ def _distances(walls: np.ndarray, goal: Cell) -> np.ndarray:
     return distances
 
 
-def _is_in(cell: Cell, door: Door) -> bool:
+def _is_in(cell: Cell, door: Passage) -> bool:
     return door.top <= cell[0] < door.bottom and door.left <= cell[1] < door.right
