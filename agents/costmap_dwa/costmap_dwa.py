@@ -46,7 +46,7 @@ def limits_of(body: Body) -> Limits:
 
 @dataclasses.dataclass
 class _Robot:
-    """What the robot in one environment remembers."""
+    """The memory of the robot in one environment."""
 
     costmap: Costmap
     goal: tuple[float, float] = (0.0, 0.0)  # m
