@@ -23,7 +23,7 @@ _NEARER = 0.002  # m, by which a robot that is too near to a wall may come neare
 
 
 class Limits(NamedTuple):
-    """What a robot can do."""
+    """The abilities of a robot."""
 
     top_speed: float  # m/s
     turn_rate: float  # rad/s

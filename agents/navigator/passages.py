@@ -45,7 +45,7 @@ def cost_of_closed(closed: np.ndarray, unseen: np.ndarray) -> np.ndarray:
 
 
 class Passages:
-    """What a robot saw of cells that were free and then wall, or the other way round; `[L, L]` arrays."""
+    """The observations of cells that were free and then wall, or the other way round; `[L, L]` arrays."""
 
     def __init__(self, memory: Memory):
         self.has_changed = False  # whether it saw any passage change

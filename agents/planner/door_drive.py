@@ -32,7 +32,7 @@ _NEVER = 1e6  # steps, by which a drive with a wait is worse for who does not wa
 
 
 class Policy(enum.Enum):
-    """What a driver knows of the doors, and whether it waits for them."""
+    """The knowledge that a driver has of the doors, and its way to deal with closed ones."""
 
     KNOWS = "knows the times, and waits where that is quicker"
     HURRIES = "knows the times, and does not wait unless there is no other way"

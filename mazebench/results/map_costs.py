@@ -27,7 +27,7 @@ LEAST_ARRIVED, NO_VERDICT = 0.9, "none, as this robot misses its goals with the 
 
 @dataclasses.dataclass(frozen=True)
 class Cost:
-    """What a map costs more than the right one, over the same trips."""
+    """The cost of a map above that of the right one, over the same trips."""
 
     metres: Estimate  # per trip
     seconds: Estimate  # per trip
@@ -37,7 +37,7 @@ class Cost:
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """What an old map costs an agent, and what to do with it."""
+    """The cost of an old map for an agent, and the verdict on it."""
 
     num_trips: int
     metres: float  # per trip with the right map
@@ -47,7 +47,7 @@ class Answer:
 
     @property
     def verdict(self) -> str:
-        """What to do with the map, by the bounds of the metres' intervals; see docs/your_map.md."""
+        """The verdict on the map, by the bounds of the metres' intervals; see docs/your_map.md."""
         little, much = LITTLE * self.metres, MUCH * self.metres
         low, high = self.old.metres.low, self.old.metres.high
         if self.num_arrived < LEAST_ARRIVED * self.num_trips:
