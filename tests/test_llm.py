@@ -5,27 +5,35 @@
 
 from __future__ import annotations
 
+import base64
 import collections
 import contextlib
+import hashlib
 import http.server
 import io
 import json
 import pathlib
 import re
+import sys
 import threading
 from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
+import pydantic
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mazebench_agents.llm import scripted
 from mazebench_agents.llm.answer import Answer
+from mazebench_agents.llm.budget import Budget, Tries
 from mazebench_agents.llm.config import LLMConfig
 from mazebench_agents.llm.decision import CUT, FILTERED, WITHOUT_TEXT, read_decision
-from mazebench_agents.llm.service import NoAnswerError, answer_of, ask_service
-from mazebench_agents.llm.situation import Situation, picture, prompt
+from mazebench_agents.llm.pictures import to_png
+from mazebench_agents.llm.service import NoAnswerError, answer_of
+from mazebench_agents.llm.service import Service as Client
+from mazebench_agents.llm.situation import Situation, View, key_of, picture, prompt, question
+from openai.types.chat import ChatCompletionContentPartParam, ChatCompletionSystemMessageParam
 from run_folders import files_of, records_of, results_of, summary_of
 
 from mazebench.agent import Agent, AgentConfig
@@ -34,6 +42,7 @@ from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
+from mazebench.maps.colors import GOAL, START, to_bytes
 from mazebench.storage.json_files import to_line
 
 GOLDEN = pathlib.Path(__file__).parent / "golden"
@@ -230,7 +239,7 @@ class TestReplies:
     def test_any_status_ends_in_one_line_without_the_key(self, serve, monkeypatch):
         monkeypatch.setenv("OPENAI_API_KEY", SECRET)
         service = serve()
-        config = LLMConfig(**service.config | {"max_retries": 0})
+        client = Client(config := LLMConfig(**service.config | {"max_retries": 0}))
 
         @QUICK
         @given(st.integers(200, 599), st.text(max_size=20) | st.just("{}"), st.booleans())
@@ -240,7 +249,7 @@ class TestReplies:
             service.status = status
             service.reply = json.dumps({"error": {"message": text}} if is_json else [text]).encode()
             with pytest.raises(RunError) as caught:
-                ask_service([], config)
+                ask_service(config, client)
             assert SECRET not in str(caught.value)
             assert len(str(caught.value)) < 500
 
@@ -297,7 +306,11 @@ class TestSecrets:
     def test_a_key_in_another_value_is_refused(self, monkeypatch):
         monkeypatch.setenv("OPENAI_API_KEY", SECRET)
         with pytest.raises(InputError, match=r"^expected the key only in OPENAI_API_KEY, found it in base_url too$"):
-            ask_service([], LLMConfig(model="m", base_url=f"https://host/{SECRET}/v1"))
+            ask_service(LLMConfig(model="m", base_url=f"https://host/{SECRET}/v1"))
+
+
+def ask_service(config: LLMConfig, client: Client | None = None) -> Answer:
+    return (client or Client(config)).ask([], Tries(Budget(config, []), []))
 
 
 class Service:
@@ -306,6 +319,8 @@ class Service:
     def __init__(self, fault: Callable[[int], object] = lambda number: None):
         self.counts: collections.Counter = collections.Counter()
         self.keys, self.closed, lock = set(), threading.Event(), threading.Lock()
+        self.headers: dict[str, str] = {}  # of the last request
+        self.bodies: list[dict] = []
         self.status, self.reply = 200, b""  # a reply other than the script's
         service = self
 
@@ -320,6 +335,8 @@ class Service:
                     wrong = fault(service.counts["requests"])
                     service.counts["answers" if wrong is None else wrong] += 1
                 service.keys.add(self.headers["Authorization"])
+                service.headers = dict(self.headers)
+                service.bodies.append(body)
                 content = b"{}" if wrong == "no choices" else b"<html>" if wrong == "no JSON" else b""
                 content = content or service.reply or service.answer(body)
                 if wrong == "too late":
@@ -327,20 +344,29 @@ class Service:
                 self.send_response(wrong if isinstance(wrong, int) else service.status)
                 self.send_header("Retry-After", "0")
                 self.send_header("Content-Length", str(len(content) + 9 * (wrong == "cut")))
+                if wrong == 301:
+                    self.send_header("Location", "https://elsewhere/v2/chat/completions")
                 self.end_headers()
+                for number in range(100 if wrong == "drips" else 0):
+                    self.wfile.write(content[number : number + 1])
+                    service.closed.wait(0.05)
                 self.wfile.write(content)
 
         quiet = {"request_queue_size": 64, "handle_error": lambda *of_client: None}
         server_class = type("Server", (http.server.ThreadingHTTPServer,), quiet)
         self.server = server_class(("127.0.0.1", 0), Handler)
         threading.Thread(target=self.server.serve_forever, args=(0.01,), daemon=True).start()
-        self.config = {"model": "m", "base_url": f"http://127.0.0.1:{self.server.server_address[1]}/v1", "backoff": 0}
+        self.config = {"model": "m", "base_url": f"http://127.0.0.1:{self.server.server_address[1]}/v1"}
 
     def answer(self, body: dict) -> bytes:
-        message = {"role": "assistant", "content": scripted.hope(body["messages"][1]["content"])}
+        message = {"role": "assistant", "content": scripted.hope(self.read(body["messages"]))}
         usage = {"prompt_tokens": 100, "completion_tokens": 10}
         choice = {"message": message, "finish_reason": "stop"}
         return json.dumps({"model": body["model"] + "-2026", "choices": [choice], "usage": usage}).encode()
+
+    def read(self, messages: list[dict]) -> str:
+        """Returns the situation in words."""
+        return messages[1]["content"]
 
     def close(self) -> None:
         self.closed.set()
@@ -348,12 +374,49 @@ class Service:
         self.server.server_close()
 
 
+class Seeing(Service):
+    """A service that reads no word of a question: it drives by the picture of the map alone."""
+
+    def read(self, messages: list[dict]) -> str:
+        pydantic.TypeAdapter(ChatCompletionSystemMessageParam).validate_python(messages[0])
+        assert messages[1].keys() == {"role", "content"}
+        for part in messages[1]["content"]:
+            pydantic.TypeAdapter(ChatCompletionContentPartParam).validate_python(part, strict=True)
+        return prompt(shown_in(pictures_of(messages)[0]))
+
+
+def pictures_of(messages: list[dict]) -> list[bytes]:
+    """Returns the pictures of a question."""
+    urls = [part["image_url"]["url"] for part in messages[1]["content"] if part["type"] == "image_url"]
+    assert all(url.startswith("data:image/png;base64,") for url in urls)
+    return [base64.b64decode(url.partition(",")[2], validate=True) for url in urls]
+
+
+def shown_in(png: bytes, pixels: int = 32) -> Situation:
+    """Returns what the picture of a map shows, here with 13 cells a side."""
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+    size = len(image) // pixels
+    cells = image.reshape(size, pixels, size, pixels, 3).swapaxes(1, 2)
+
+    def cells_with(*color: int) -> np.ndarray:
+        return (cells == color).all(axis=-1).sum(axis=(2, 3))
+
+    edges = np.concatenate([cells[:, :, [2, -3], 2:-2], cells[:, :, 2:-2, [2, -3]].swapaxes(2, 3)], axis=2)
+    walls = np.median(edges.mean(axis=-1), axis=(2, 3)) < 128
+    start, goal = (cells_with(*to_bytes(color)) for color in (START, GOAL))
+    ends = [divmod(int(found.argmax()), size) if found.any() else None for found in (start, goal)]
+    seen = (cells_with(255, 150, 0) > 0).astype(np.int8) - (cells_with(110, 190, 255) > 0)
+    robot = cv2.distanceTransform((image == (230, 0, 230)).all(axis=-1).astype(np.uint8), cv2.DIST_L2, 5)
+    y, x = np.unravel_index(robot.argmax(), robot.shape)
+    return Situation(walls, *ends, seen, (x / pixels, size - y / pixels, 0.0), 1.0, 1, False, 0)
+
+
 @pytest.fixture
 def serve() -> Iterator[Callable[..., Service]]:
     services: list[Service] = []
 
-    def start(*arguments) -> Service:
-        services.append(Service(*arguments))
+    def start(*arguments, kind: type[Service] = Service) -> Service:
+        services.append(kind(*arguments))
         return services[-1]
 
     yield start
@@ -429,7 +492,9 @@ class TestService:
         with pytest.raises(RunError, match="of token_limit 9,000"):
             evaluate("llm", out=tmp_path, overrides=config, **ONE)
         assert remarks() == [
-            "agent 'llm': the service tells no usage of an answer, which counts as the most that it may take"
+            "llm: 1 episodes, some 10 questions each (the scripts' mean; at most 3): some 3 questions, "
+            "0.002 million tokens in, at most 0.012 million out",
+            "agent 'llm': the service tells no usage of an answer, which counts as the most that it may take",
         ]
         assert len(answers_of(tmp_path)) == 1
 
@@ -454,6 +519,164 @@ class TestService:
     def test_another_model_is_another_run(self, unbroken):
         with pytest.raises(InputError, match="holds another run: its config is"):
             evaluate("llm", out=unbroken, overrides={"model": "other"}, resume=True, **FLIPPED)
+
+    def test_what_tries_without_a_reply_may_have_taken_counts(self, tmp_path, serve):
+        service = serve({1: "cut"}.get)
+        config = service.config | {"max_decisions": 1, "max_tokens": 100}
+        evaluate("llm", out=tmp_path / "run", overrides=config, **ONE)
+        (answer,) = answers_of(tmp_path / "run")
+        assert 1000 < answer["lost_tokens"] - 100 < 4000  # the bytes of the question
+        other = serve({1: "cut"}.get)
+        limit = {"token_limit": 2 * answer["lost_tokens"] - 1}
+        with pytest.raises(RunError, match=r"spent [\d,]+ tokens of token_limit .*, and the next answer may take"):
+            evaluate("llm", out=tmp_path / "short", overrides=config | other.config | limit, **ONE)
+        assert other.counts["requests"] == 1
+
+    def test_a_reply_has_a_largest_size_and_a_longest_time(self, serve, monkeypatch):
+        service = serve({1: "drips"}.get)
+        service.reply = reply("WAIT " * 100)
+        config = LLMConfig(**service.config | {"max_retries": 0, "timeout": 0.5})
+        with pytest.raises(RunError, match=r"ReadTimeout: expected a reply within 0\.5 s"):
+            ask_service(config)
+        monkeypatch.setattr("mazebench_agents.llm.service._LARGEST_REPLY", 400)
+        with pytest.raises(RunError, match="RemoteProtocolError: expected at most 400 bytes, found more"):
+            ask_service(config)
+
+    def test_a_service_that_moved_is_not_followed_but_named(self, serve):
+        service = serve({1: 301}.get)
+        service.reply = b"moved"
+        with pytest.raises(RunError, match="HTTP 301: it has moved; give base_url=https://elsewhere/v2;"):
+            ask_service(LLMConfig(**service.config))
+        assert service.counts["requests"] == 1
+
+    def test_variables_of_the_client_are_not_read(self, serve, monkeypatch):
+        for name in ("API_KEY", "ADMIN_KEY", "ORG_ID", "PROJECT_ID"):
+            monkeypatch.setenv(f"OPENAI_{name}", SECRET)
+        monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:9/v1")
+        monkeypatch.setenv("OPENAI_CUSTOM_HEADERS", f"X-Other: {SECRET}")
+        monkeypatch.setenv("MY_KEY", "mine-1")
+        monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # which this machine's own services need not
+        service = serve()
+        service.reply = reply("WAIT")
+        ask_service(LLMConfig(**service.config | {"key_variable": "MY_KEY"}))
+        assert service.headers.pop("Authorization") == "Bearer mine-1"
+        own = {"Host", "Accept", "Accept-Encoding", "Connection", "User-Agent", "Content-Type", "Content-Length"}
+        assert {name.title() for name in service.headers} == own
+        assert SECRET not in str(service.headers)
+        with pytest.raises(RunError, match=r"^http://far\.invalid/v1/chat/completions through the environment's proxy"):
+            ask_service(LLMConfig(model="m", base_url="http://far.invalid/v1", max_retries=0, key_variable="MY_KEY"))
+
+    def test_without_the_client_one_line_says_what_brings_it(self, tmp_path, monkeypatch):
+        monkeypatch.setitem(sys.modules, "openai", None)
+        monkeypatch.delitem(sys.modules, "mazebench_agents.llm.service")
+        said = r"^agent 'llm': a service needs the package openai, which the extra \[llm\] brings"
+        with pytest.raises(InputError, match=said):
+            evaluate("llm", overrides={"model": "m", "base_url": "http://127.0.0.1:9/v1"}, **ONE)
+
+
+class TestPictures:
+    def test_the_picture_shows_what_the_words_say(self):
+        told = situation(told=False)
+        shown = shown_in(to_png(picture(told, shows_seen=True)))
+        seen = told.seen.copy()
+        assert (shown.walls == told.walls).all()
+        assert (shown.start, shown.goal, shown.here) == (told.start, told.goal, told.here)
+        assert (shown.seen == seen).all()
+        assert not shown_in(to_png(picture(told))).seen.any()
+
+    @pytest.mark.parametrize("see", ["map", "both"])
+    def test_who_reads_the_picture_drives_as_who_reads_the_words(self, unbroken, tmp_path, serve, see):
+        service = serve(kind=Seeing)
+        evaluate("llm", out=tmp_path / "run", overrides=service.config | {"see": see}, **FLIPPED)
+        assert driven(tmp_path / "run") == driven(unbroken)
+        texts = [body["messages"][1]["content"][0]["text"] for body in service.bodies]
+        assert all(("SEEN SO FAR" in text) == (see == "both") for text in texts)
+
+        # Each picture is kept once, and a replay asks nobody.
+        kept = sorted((tmp_path / "run" / "pictures").iterdir())
+        assert [hashlib.sha256(path.read_bytes()).hexdigest() for path in kept] == [path.stem for path in kept]
+        named = {name for answer in answers_of(tmp_path / "run") for name in answer["pictures"]}
+        assert named == {path.stem for path in kept}
+        replay = {"model": "m", "see": see, "replay": str(tmp_path / "run")}
+        evaluate("llm", out=tmp_path / "again", overrides=replay, **FLIPPED)
+        again, before = results_of(tmp_path / "again"), results_of(tmp_path / "run")
+        assert sorted(again.pop("answers.jsonl").splitlines()) == sorted(before.pop("answers.jsonl").splitlines())
+        assert again == before
+
+    def test_what_the_camera_sees_takes_the_place_of_what_was_seen(self, tmp_path, serve):
+        service = serve()
+        service.reply = reply("GO north\nGO south", usage={"prompt_tokens": 900, "completion_tokens": 10})
+        config = service.config | {"see": "egocentric", "max_decisions": 6}
+        evaluate("llm", out=tmp_path, overrides=config, **ONE)
+        assert summary_of(tmp_path)["task"]["sensors"] == ["lidar", "egocentric"]
+        numbers = []
+        for body in service.bodies:
+            text = body["messages"][1]["content"][0]["text"]
+            drawn, *views = pictures_of(body["messages"])
+            assert not shown_in(drawn).seen.any()
+            row, column = map(int, re.search(r"The robot is in cell \((\d+), (\d+)\)", text).groups())
+            x, y, _ = shown_in(drawn).pose
+            assert max(abs(x - column - 0.5), abs(13 - y - row - 0.5)) < 0.6
+            assert "SEEN" not in text
+            assert "small square" not in text
+            sizes = {cv2.imdecode(np.frombuffer(view, np.uint8), cv2.IMREAD_COLOR).shape for view in views}
+            assert sizes == {(180, 768, 3)}
+            numbers.append(len(views))
+            assert len(re.findall("^Picture ", text, re.M)) == len(views)
+        assert numbers[0] == 1
+        assert max(numbers) > 1
+
+    def test_egocentric_tells_nothing_of_what_the_lidar_saw_and_the_pose_of_the_words(self, command):
+        view = View(np.zeros((180, 768, 3), np.uint8), 4, (1, 2), "")
+        one = situation(told=False)._replace(see="egocentric", views=(view,))
+        assert question(one) == question(one._replace(seen=np.zeros_like(one.seen)))
+        assert key_of(one, {}) != key_of(one._replace(views=(view._replace(picture=view.picture + 1),)), {})
+        # Where the pose is lost, too.
+        words = ("--track", "adrift", "--level", "2", "--split", "dev", "--episode", "7", "--decision", "2")
+        told = [
+            re.search(r"NOW\n.*\n.*\nStep", command("prompt", *words, "--set", f"see={see}")[1])[0]
+            for see in ("text", "egocentric")
+        ]
+        assert told[0] == told[1]
+
+    def test_a_narrow_camera_is_shown_as_it_is(self, tmp_path, command):
+        words = ("--track", "rebuilt", "--level", "2", "--split", "dev", "--sensors", "lidar,egocentric")
+        status, shown, _ = command("prompt", *words, "--set", "see=egocentric")
+        assert status == 0
+        assert re.search(r"^Picture 2: now, from cell \(\d+, \d+\), which faces \w+\.$", shown, re.M)
+        assert cv2.imread(str(tmp_path / "prompt" / "picture-2.png")).shape == (64, 64, 3)
+
+
+class TestCost:
+    RUN = ("eval", "--agent", "llm", "--set", "model=m", "--set", "base_url=http://127.0.0.1:9/v1")
+
+    def test_a_dry_run_says_what_a_suite_may_cost_and_asks_nobody(self, command, tmp_path):
+        status, output, errors = command(*self.RUN, "--suite", "llm-dev", "--set", "price=2.5,10", "--dry-run")
+        assert (status, output) == (0, "")
+        (line,) = errors.splitlines()
+        assert re.fullmatch(
+            r"mazebench: llm: 192 episodes, some 10 questions each \(the scripts' mean; at most 30\): "
+            r"some 1,920 questions, [\d.]+ million tokens in, at most 7\.9 million out; "
+            r"some \d\.\d\d dollars in, at most 78\.64 out",
+            line,
+        )
+        assert not [*tmp_path.iterdir()]
+
+    def test_a_dry_run_of_another_agent_costs_nothing(self, command, tmp_path):
+        status, _, errors = command("eval", "--agent", "planner", "--dry-run", "--out", "run")
+        assert (status, errors) == (0, "mazebench: planner: 1,500 episodes, which cost nothing\n")
+        assert not [*tmp_path.iterdir()]
+
+    def test_the_summary_has_the_money_of_all_tokens(self, tmp_path, serve):
+        service = serve()
+        evaluate("llm", out=tmp_path, overrides=service.config | {"price": "2000,30000"}, **ONE)
+        counts = summary_of(tmp_path)["counts"]
+        assert counts["dollars"] == pytest.approx(counts["decisions"] * (100 * 2000 + 10 * 30000) / 1e6)
+
+    @pytest.mark.parametrize("price", ["1", "1,2,3", "-1,2", "a,b", "nan,1"])
+    def test_a_price_is_two_numbers(self, price):
+        with pytest.raises(InputError, match="expected price=IN,OUT, dollars per million tokens"):
+            LLMConfig(price=price)
 
 
 class TestReplay:
@@ -508,7 +731,7 @@ class TestPerson:
         assert all(each["seconds"] > 0 for each in answers_of(tmp_path))
         shown = capsys.readouterr().out
         assert "- hello: not done, no line with GO or WAIT was found" in shown
-        assert cv2.imread(str(tmp_path / "picture.png")).shape == (12 * 13, 12 * 13, 3)
+        assert cv2.imread(str(tmp_path / "picture.png")).shape == (32 * 13, 32 * 13, 3)
 
     def test_episodes_side_by_side_are_refused(self, tmp_path):
         with pytest.raises(InputError, match="expected --num-envs 1 for a person, found 20 episodes side by side"):
@@ -550,7 +773,7 @@ class TestAgents:
         assert "LAST DECISIONS\n- none yet\n" in first[1]
         assert "LAST DECISIONS\n- GO (" in second[1]
         assert (tmp_path / "shown" / "prompt.txt").read_text() == second[1]
-        assert cv2.imread(str(tmp_path / "shown" / "picture.png")).shape == (372, 372, 3)
+        assert cv2.imread(str(tmp_path / "shown" / "picture.png")).shape == (744, 744, 3)
 
 
 class Failing(Agent):

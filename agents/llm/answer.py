@@ -26,8 +26,10 @@ class Answer(pydantic.BaseModel):
     finish_reason: _Text = ""
     input_tokens: int = 0
     output_tokens: int = 0  # thoughts included
+    lost_tokens: int = 0  # the most that tries before it may have taken, whose replies were lost
     seconds: float = 0.0  # that it took
-    prompt: str = ""  # SHA-256 of messages, sampling and seed
+    prompt: str = ""  # SHA-256 of what was asked, sampling and seed
+    pictures: tuple[str, ...] = ()  # SHA-256 of the pictures that were shown, by which files in `pictures` are named
     seed: int = 0  # of the question, as the next one
     decision: int = 0
     time: str = ""  # UTC

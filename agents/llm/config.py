@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import re
 import urllib.parse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 from annotated_types import Ge, Interval
@@ -20,11 +21,14 @@ from mazebench.errors import InputError
 from mazebench.options import OneOf, ReadBy
 from mazebench.storage.json_files import parse_json
 
-from .situation import WORDING
+from .cost import QUESTIONS, input_tokens
+from .situation import EGOCENTRIC, SEES, TEXT, WORDING
 
 SHORTEST_KEY = 6  # characters; what is shorter, as "EMPTY", is no secret
 _KEY = "OPENAI_API_KEY"
-_IDENTITY = ("model", "mode", "temperature", "max_tokens", "extra", "history", "max_decisions")
+_IDENTITY = ("model", "mode", "see", "temperature", "max_tokens", "extra", "history", "max_decisions")
+# The view all round that a model is shown; the robot drives by its lidar, as where words are shown.
+_CAMERA: dict[str, dict[str, Any]] = {"lidar": {}, "egocentric": {"camera_size": 384, "camera_fov": 360.0}}
 # Words in the names of fields whose texts are secrets.
 _SECRETS = {"apikey", "auth", "authorization", "bearer", "cookie", "credential", "credentials", "key", "password"}
 _SECRETS |= {"passwd", "secret", "token"}
@@ -70,6 +74,17 @@ def _read_url(url: Any) -> str:
     return str(url)
 
 
+def _read_price(text: Any) -> str:
+    """Returns two prices as they were given, or an empty text."""
+    try:
+        prices = [float(each) for each in text.split(",")] if text else [0.0, 0.0]
+    except ValueError:
+        prices = []
+    if len(prices) != 2 or not all(0 <= each < math.inf for each in prices):
+        raise InputError("expected price=IN,OUT, dollars per million tokens, found something else")
+    return str(text)
+
+
 def _read_variable(name: Any) -> str:
     """Returns the name of a variable of the environment that is set, or the usual one."""
     if name != _KEY and not (re.fullmatch(r"[A-Z_][A-Z0-9_]*", name) and name in os.environ):
@@ -85,6 +100,7 @@ class LLMConfig(AgentConfig):
 
     model: str = ""  # as the service calls it; or person:NAME, script:NAME, or show:K, which writes the Kth question
     mode: Annotated[str, OneOf("notice", "told")] = "notice"  # whether it must see what differs, or is told
+    see: Annotated[str, OneOf(*SEES)] = TEXT  # the grids, the map as a picture, both, or the map and the camera's views
     temperature: Annotated[float, Interval(ge=0, le=2)] = 0.0
     max_tokens: Annotated[int, Ge(1)] = 4096  # of an answer, thoughts included
     extra: Annotated[str, ReadBy(_read_extra)] = "{}"  # more fields of a request, as JSON; null leaves one out
@@ -94,11 +110,11 @@ class LLMConfig(AgentConfig):
     # How the service is reached, which makes no difference to results.
     base_url: Annotated[str, ReadBy(_read_url)] = ""
     key_variable: Annotated[str, ReadBy(_read_variable)] = _KEY  # of the environment, with the key
-    timeout: Annotated[float, Interval(ge=0.01, le=3600)] = 120.0  # s, until an answer begins, and between its parts
+    timeout: Annotated[float, Interval(ge=0.01, le=3600)] = 120.0  # s, of a try
     max_retries: Annotated[int, Interval(ge=0, le=100)] = 6  # of a request
-    backoff: Annotated[float, Interval(ge=0, le=60)] = 1.0  # s before the first retry, then twice as long each time
     concurrency: Annotated[int, Interval(ge=1, le=1024)] = 32  # requests at once
     token_limit: Annotated[int | None, Ge(1)] = None  # in and out, of one evaluation, which then ends
+    price: Annotated[str, ReadBy(_read_price)] = ""  # IN,OUT: dollars per million tokens, for lines on what it costs
     replay: str = ""  # a folder of results, from whose answers the run is made again; nothing is asked
 
     @property
@@ -111,6 +127,34 @@ class LLMConfig(AgentConfig):
     def asks_service(self) -> bool:
         """True unless a person or a script answers, or answers are replayed."""
         return not self.replay and self.model.partition(":")[0] not in ("person", "script", "show")
+
+    @property
+    def sensor_options(self) -> Mapping[str, Mapping[str, Any]]:
+        """The lidar and a camera all round where a model is shown what the robot sees."""
+        return _CAMERA if self.see == EGOCENTRIC else {}
+
+    def cost(self, episodes: int, size: int) -> str:
+        """Returns a line on questions, tokens and money where a service is asked."""
+        if not self.asks_service:
+            return ""
+        questions = episodes * min(QUESTIONS, self.max_decisions)
+        read, written = questions * input_tokens(self.see, self.mode == "told", size), questions * self.max_tokens
+        each = f"some {QUESTIONS} questions each (the scripts' mean; at most {self.max_decisions})"
+        line = f"{episodes:,} episodes, {each}: some {questions:,} questions, "
+        line += f"{read / 1e6:,.2g} million tokens in, at most {written / 1e6:,.2g} million out"
+        if self.price:
+            dollars = [
+                self.sums({f"{way}put_tokens": number})["dollars"] for way, number in (("in", read), ("out", written))
+            ]
+            line += "; some {:,.2f} dollars in, at most {:,.2f} out".format(*dollars)
+        return line
+
+    def sums(self, counts: Mapping[str, float]) -> dict[str, float]:
+        """Returns the dollars of tokens, if their price is known."""
+        if not self.price:
+            return {}
+        prices = zip(self.price.split(","), ("input_tokens", "output_tokens"), strict=True)
+        return {"dollars": round(sum(float(price) * counts.get(name, 0) for price, name in prices) / 1e6, 4)}
 
     @property
     def needs_one_process(self) -> bool:

@@ -26,7 +26,8 @@ from .answer import Answer
 from .answers import Answers
 from .config import LLMConfig
 from .decision import CUT, FILTERED, WITHOUT_TEXT, read_decision
-from .situation import Situation
+from .pictures import draw_panorama
+from .situation import EGOCENTRIC, NUM_VIEWS, Situation, View, facing
 
 _NOTES = ("decisions", "not_done", "input_tokens", "output_tokens", "seconds")  # of an episode; from the third on, sums
 _SAID = {  # once, of an answer that holds no decision
@@ -49,6 +50,8 @@ class _Driver:
     under_way: str = ""  # the decision that led to the route
     decisions: list[str] = dataclasses.field(default_factory=list)  # with what came of them
     told: np.ndarray = dataclasses.field(init=False)  # [N, N] bool, the differing cells that a prompt has named
+    views: list[View] = dataclasses.field(default_factory=list)  # that of its cell, and those at its last turns
+    direction: tuple[int, ...] = ()  # from the cell before to the robot's, (rows, columns)
     step: int = 0
     notes: dict[str, Any] = dataclasses.field(default_factory=lambda: dict.fromkeys(_NOTES, 0))  # of the record
 
@@ -92,7 +95,9 @@ class LLM(Agent):
         if side != size:
             raise UnplayableError(f"agent 'llm': expected the building's {size} x {size} cells, found {side} x {side}")
         self._config, self._kind, self._senses = config, interface.actions, Senses(interface, "llm")
-        self._body = interface.body
+        self._body, self._camera = interface.body, interface.camera
+        if config.see == EGOCENTRIC:
+            interface.require_sensor("egocentric", "llm")
         self._answers, self._flaws = Answers(config, folder), {""}
         # For each way in which the map may be turned, the place of each of its cells on the turned map, as numbers.
         turned = orientations(np.arange(size**2).reshape(size, size), 8)
@@ -159,7 +164,7 @@ class LLM(Agent):
         turn, row, column = belief.placements[belief.log_weights.argmax()].tolist()
         if driver.placement not in ((), (turn, row, column)):
             driver.end_route("the robot changed its mind about where it is on the map")
-            driver.told[:] = False
+            driver.told[:], driver.views = False, []
         driver.placement = turn, row, column
         evidence = memory.evidence[-row : size - row, -column : size - column]
         seen = (np.sign(evidence) * (np.abs(evidence) >= SURE)).astype(np.int8)
@@ -171,7 +176,10 @@ class LLM(Agent):
             step=driver.step,
             told=self._config.mode == "told",
             seed=int(inputs.seed[slot]),
+            see=self._config.see,
         )
+        if self._config.see == EGOCENTRIC:
+            self._look(driver, inputs.observation["egocentric"][slot])
 
         # The rest of the route; it goes on from a cell beside it.
         here = driver.situation.here
@@ -179,6 +187,21 @@ class LLM(Agent):
         rest = driver.route[int(np.argmin(away)) :] if away else ()
         driver.route = rest if here in rest else (here, *rest) if 1 in away else ()
         return driver
+
+    def _look(self, driver: _Driver, picture: np.ndarray) -> None:
+        """Takes in what the camera sees. Of the cells before, views are kept where the robot turned."""
+        situation = driver.situation
+        is_all_round = self._camera is not None and self._camera.fov == 360
+        yaw = situation.pose[2]
+        image, faces = (draw_panorama(picture, yaw), "") if is_all_round else (picture.copy(), facing(yaw))
+        view, before = View(image, driver.step, situation.here, faces), driver.views[:1]
+        if before and before[0].cell != view.cell:
+            direction = tuple(np.sign(np.subtract(view.cell, before[0].cell)).tolist())
+            goes_on = direction == driver.direction
+            driver.views, driver.direction = [view, *driver.views[goes_on:]][:NUM_VIEWS], direction
+        else:
+            driver.views[:1] = [view]
+        driver.situation = situation._replace(views=tuple(driver.views))
 
     def _question(self, driver: _Driver) -> Situation | None:
         """Returns what a driver asks; None if it needs no decision. A route that is driven or blocked ends."""

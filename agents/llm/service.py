@@ -1,73 +1,133 @@
-"""Asks a service with the chat API of OpenAI, and reads what it replies."""
+"""Asks a service with the chat API of OpenAI by its client, and reads what it replies."""
 
 from __future__ import annotations
 
 import contextlib
-import http.client
 import json
-import random
+import threading
 import time
-import urllib.error
 import urllib.request
 from typing import Any
+
+import httpx2
+import openai
 
 from mazebench import stopping
 from mazebench.errors import RunError, shortened
 from mazebench.storage.json_files import parse_json
 
 from .answer import RESUME, Answer
+from .budget import Tries
 from .config import SHORTEST_KEY, LLMConfig
 
-_RETRIED = (408, 409, 425, 429, *range(500, 600))  # statuses of HTTP
-_LONGEST_WAIT = 60.0  # s before a retry
+_LARGEST_REPLY = 2**24  # bytes
 _LARGEST_COUNT = 2**53  # tokens that are still believed
-# A service that refuses, does not answer in time or breaks off, and a reply without an answer.
-_FAULTS = (OSError, http.client.HTTPException, ValueError)
+_LOOPBACK = ("127.0.0.1", "localhost", "[::1]")  # never by a proxy
+_OF_TRANSFER = ("content-encoding", "content-length", "transfer-encoding")  # headers that a read body has no more
+_NOT_SENT = (httpx2.ConnectError, httpx2.ConnectTimeout)
 
 
-def ask_service(messages: list[dict[str, str]], config: LLMConfig) -> Answer:
-    """Returns the answer of a service; what fails is tried again, and never counts.
+class Service:
+    """The service of a config, which threads may ask at once."""
 
-    The key is shown as *** in errors and in the answer.
+    def __init__(self, config: LLMConfig):
+        """Raises `InputError` if the key can't be sent."""
+        self._sampling, self._http = config.sampling, _Http(config)
+        # The client's own variables have no effect: it sends by `_Http`, which takes nothing but the body of a request.
+        self._client = openai.OpenAI(
+            api_key="in _Http", base_url=config.base_url, max_retries=config.max_retries, http_client=self._http
+        )
 
-    Raises:
-      InputError: if the key can't be sent; then no try is made.
-      RunError: if no try succeeds.
-    """
-    key, url = config.key, config.base_url.rstrip("/") + "/chat/completions"
-    data = json.dumps({"messages": messages, **config.sampling}).encode()
-    request = urllib.request.Request(url, data, {"Content-Type": "application/json", "User-Agent": "mazebench"})
-    if key:
-        request.add_unredirected_header("Authorization", f"Bearer {key}")
+    def ask(self, messages: list[dict[str, Any]], tries: Tries) -> Answer:
+        """Returns the answer of the service; the client tries again what fails.
 
-    def hide(text: str) -> str:
-        return text.replace(key, "***") if len(key) >= SHORTEST_KEY else text
+        The key is shown as *** in errors and in the answer.
 
-    said, wait = "", 0.0
-    for attempt in range(config.max_retries + 1):
-        time.sleep(min(wait, _LONGEST_WAIT))
-        stopping.check()
-        wait, began = config.backoff * 2**attempt * random.uniform(0.5, 1.0), time.monotonic()
+        Raises:
+          RunError: if no try succeeds, or no other one is within the limit of tokens.
+        """
+        self._http.asking.tries = tries
+        hide = self._http.hide
         try:
-            with urllib.request.urlopen(request, timeout=config.timeout) as response:
-                answer = answer_of(response.read())
-            texts = {name: hide(getattr(answer, name)) for name in ("text", "model", "finish_reason")}
-            return answer.model_copy(update={**texts, "seconds": time.monotonic() - began})
-        except urllib.error.HTTPError as error:
-            said = f"HTTP {error.code}"
-            with contextlib.suppress(OSError, http.client.HTTPException):  # of a body that breaks off
-                said += f": {shortened(hide(_message_in(error.read(2**16))), 200)}"
-            if error.code not in _RETRIED:
-                raise RunError(f"{url}: {said}; {RESUME}") from error
-            if (asked := error.headers.get("Retry-After", "")).isdecimal():
-                wait = float(asked)
-        except _FAULTS as error:
-            kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
-            said = shortened(hide(f"{kind}{error}"), 200)
-    raise RunError(f"{url}: no answer in {config.max_retries + 1} tries, the last one {said}; {RESUME}")
+            self._client.post(
+                "/chat/completions", cast_to=httpx2.Response, body={"messages": messages, **self._sampling}
+            )
+        except openai.APIStatusError as error:
+            said, content = f"HTTP {error.status_code}", error.response.content
+            if error.response.has_redirect_location:
+                address = error.response.headers["location"].removesuffix("/chat/completions")
+                said += f": it has moved; give base_url={shortened(hide(address), 200)}"
+            else:
+                said += f": {shortened(hide(_message_in(content)), 200)}"
+            raise self._failed(tries, said) from error
+        except openai.APIConnectionError as error:
+            cause = error.__cause__
+            kind = "" if isinstance(cause, NoAnswerError) else f"{type(cause).__name__}: "
+            raise self._failed(tries, shortened(hide(f"{kind}{cause}"), 200)) from error
+        assert tries.answer is not None
+        return tries.answer
+
+    def _failed(self, tries: Tries, said: str) -> RunError:
+        """Returns the error of a question whose last try ended so."""
+        by = " through the environment's proxy" if self._http.is_proxied else ""
+        if tries.number > 1:
+            said = f"no answer in {tries.number} tries, the last one {said}"
+        return RunError(f"{self._http.url}{by}: {said}; {RESUME}")
 
 
-class NoAnswerError(ValueError):
+class _Http(httpx2.Client):
+    """Sends the tries of questions to one address, with headers of its own, and reads replies of a bounded size."""
+
+    def __init__(self, config: LLMConfig):
+        self.url = httpx2.URL(config.base_url.rstrip("/") + "/chat/completions")
+        self._secret, self._longest = config.key, config.timeout
+        self._sent = {"Content-Type": "application/json", "User-Agent": "mazebench"}
+        if self._secret:
+            self._sent["Authorization"] = f"Bearer {self._secret}"
+        self.asking = threading.local()  # its `tries` are those of the question that a thread asks
+        is_local = self.url.host in (name.strip("[]") for name in _LOOPBACK)
+        proxies = urllib.request.getproxies()
+        skips = urllib.request.proxy_bypass(self.url.host)
+        self.is_proxied = not is_local and not skips and bool({self.url.scheme, "all"} & proxies.keys())
+        direct = {f"all://{name}": None for name in _LOOPBACK}
+        super().__init__(timeout=self._longest, limits=httpx2.Limits(max_connections=None), mounts=direct)
+
+    def hide(self, text: str) -> str:
+        """Returns a text of a service without the key."""
+        return text.replace(self._secret, "***") if len(self._secret) >= SHORTEST_KEY else text
+
+    def send(self, request: httpx2.Request, **others: Any) -> httpx2.Response:
+        """Returns the reply to a try, whose answer the question's tries then have.
+
+        Raises:
+          httpx2.RequestError: if there is none, it is too large or takes too long, or holds no answer.
+        """
+        stopping.check()
+        tries: Tries = self.asking.tries
+        with tries.next(costs_nothing=_NOT_SENT):
+            began = time.monotonic()
+            response = super().send(
+                self.build_request("POST", self.url, content=request.content, headers=self._sent),
+                stream=True,
+                follow_redirects=False,
+            )
+            with contextlib.closing(response):
+                body = b""
+                for part in response.iter_bytes():
+                    body += part
+                    if len(body) > _LARGEST_REPLY:
+                        raise httpx2.RemoteProtocolError(f"expected at most {_LARGEST_REPLY:,} bytes, found more")
+                    if time.monotonic() - began > self._longest:
+                        raise httpx2.ReadTimeout(f"expected a reply within {self._longest:g} s")
+            if response.is_success:
+                answer = answer_of(body)
+                texts = {name: self.hide(getattr(answer, name)) for name in ("text", "model", "finish_reason")}
+                tries.answer = answer.model_copy(update={**texts, "seconds": time.monotonic() - began})
+        headers = [(name, value) for name, value in response.headers.multi_items() if name not in _OF_TRANSFER]
+        return httpx2.Response(response.status_code, headers=headers, content=body, request=request)
+
+
+class NoAnswerError(httpx2.RequestError):
     """A reply of a service that holds no answer; the message is what the service said."""
 
 

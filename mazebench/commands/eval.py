@@ -55,6 +55,9 @@ def evaluate(
     show_traceback: Annotated[
         bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers.")
     ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say how many episodes there are and what they may cost; run nothing.")
+    ] = False,
     no_cache: NoCache = False,  # its callback does it
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
@@ -102,13 +105,24 @@ def evaluate(
             with progress.evaluating(title, kept) as show:
                 summing = functools.partial(show, sums_up=True)
                 if suite is None:
-                    summary = run_evaluation(options, folder, run, show, summing=summing, shard=share)
+                    summary = run_evaluation(options, folder, run, show, summing=summing, shard=share, is_dry=dry_run)
                     summaries = [summary] if summary else []
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
                     summaries = run_suite(
-                        suite, agents, folder, run, show, summing, shard=share, body=task.body, **chosen
+                        suite,
+                        agents,
+                        folder,
+                        run,
+                        show,
+                        summing,
+                        shard=share,
+                        body=task.body,
+                        is_dry=dry_run,
+                        **chosen,
                     )
+            if dry_run:
+                return
             if shard is not None:
                 end_shard(folder, share)
             elif suite is None:

@@ -101,12 +101,13 @@ def run_evaluation(
     executor: concurrent.futures.Executor | None = None,
     shard: Shard = WHOLE,
     summing: Progress = lambda ended, of: None,
+    is_dry: bool = False,
 ) -> Summary | None:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
     `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
     already. Of a `shard` without episodes, None is returned. `summing` is called as the oracle's drives end, which are
-    measured after the last episode.
+    measured after the last episode. If `is_dry`, it says what the evaluation may cost and runs nothing.
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
@@ -117,10 +118,25 @@ def run_evaluation(
             f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
         )
     episodes = shard.numbers(plan.trials)
+    say_cost([(plan, len(episodes))], is_dry)
+    if is_dry:
+        return None
     with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
         job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
         summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None
+
+
+def say_cost(plans: Iterable[tuple[Plan, int]], is_dry: bool) -> None:
+    """Says for each agent of some plans what so many episodes may cost; if `is_dry`, also that they are free."""
+    of_agents: dict[str, tuple[Plan, int]] = {}
+    for plan, episodes in plans:
+        first, before = of_agents.get(plan.options.agent, (plan, 0))
+        of_agents[plan.options.agent] = first, before + episodes
+    for name, (plan, episodes) in of_agents.items():
+        line = plan.cost(episodes) or (f"{name}: {episodes:,} episodes, which cost nothing" if is_dry else "")
+        if line:
+            remark(line)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -224,7 +240,7 @@ def _finish(job: Job, store: Store, num_envs: int, summing: Progress) -> Summary
             for older in plan.task.arena.shown or ()
             if older.pair is not None
         },
-        counts=counts_in(records),
+        counts=plan.summed(counts_in(records)),
     )
     store.finish(records, summary)
     return summary

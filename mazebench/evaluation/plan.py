@@ -82,9 +82,21 @@ class Plan:
         if workers and config is not None and config.needs_one_process:
             raise InputError(f"agent {self.options.agent!r}: expected no --workers with this config, found {workers}")
 
+    def cost(self, episodes: int) -> str:
+        """Returns a line on what so many episodes may cost; an empty one if nothing."""
+        config = config_of(self.options, self.agent_class)
+        line = config.cost(episodes, self.task.size) if config else ""
+        return f"{self.options.agent}: {line}" if line else ""
+
+    def summed(self, counts: dict[str, int]) -> dict[str, float]:
+        """Returns sums of what the agent noted with those that its config makes of them."""
+        config = config_of(self.options, self.agent_class)
+        return {**counts, **(config.sums(counts) if config else {})}
+
     def say_remarks(self, *, of_maps: bool = True) -> None:
         """Warns of the sensors that the agent does not read and, with `of_maps`, of maps for which it is not made."""
-        unread = unread_sensors(self.options.agent, self.agent_class, self.task.options)
+        config = config_of(self.options, self.agent_class)
+        unread = unread_sensors(self.options.agent, self.agent_class, self.task.options, config)
         for line in (self.remark if of_maps else None, unread):
             if line:
                 remark(line)
@@ -195,9 +207,10 @@ def make_plan(
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    task = task_as_played(options.agent, agent_class, task or options.task, resolver)
+    config = config_of(options, agent_class)
+    task = task_as_played(options.agent, agent_class, task or options.task, resolver, config)
     _check_episodes(options, task.options)
-    options, config = _with_checkpoint(options, agent_class), config_of(options, agent_class)
+    options = _with_checkpoint(options, agent_class)
     if task.options.track is None or task.options.mazes is None:
         options = options.replace(episodes_per_distance=options.episodes_per_distance or EPISODES_PER_DISTANCE)
     if ":" in options.agent:  # modules that it imports when it is built are part of its code
@@ -246,9 +259,15 @@ def _square(side: int) -> str:
 
 
 def task_as_played(
-    agent: str, agent_class: type[Agent], asked: TaskOptions | Task, resolver: Callable[..., Task]
+    agent: str,
+    agent_class: type[Agent],
+    asked: TaskOptions | Task,
+    resolver: Callable[..., Task],
+    config: AgentConfig | None = None,
 ) -> Task:
     """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps.
+
+    The values of its `config` may ask for sensors, too.
 
     Raises:
       UnplayableError: if sensors other than the lidar are named, and the agent needs more.
@@ -257,7 +276,9 @@ def task_as_played(
     chosen: dict[str, Any] = {}
     if options.actions is None and "six" not in plays:
         chosen["actions"] = plays[0]
-    chosen["sensors"] = sensors_of(agent_class, options.sensors)
+    chosen["sensors"] = sensors_of(agent_class, options.sensors, config)
+    for sensor, values in config.sensor_options.items() if config else ():
+        chosen |= values if sensor in chosen["sensors"] and sensor not in options.sensors else {}
     if isinstance(asked, TaskOptions):
         chosen["context_size"] = None
     chosen = {name: value for name, value in chosen.items() if value != getattr(options, name)}

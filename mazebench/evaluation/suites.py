@@ -14,7 +14,7 @@ from typing import Any
 from mazebench.agent import Interface
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard
-from mazebench.evaluation.evaluate import Job, Progress, run_jobs
+from mazebench.evaluation.evaluate import Job, Progress, run_jobs, say_cost
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.evaluation.pool import pool_of
 from mazebench.evaluation.store import check_same_run, is_finished
@@ -168,6 +168,7 @@ def run_suite(
     shard: Shard = WHOLE,
     own_parts: Sequence[Part] | None = None,
     body: Any = SLIDER.name,
+    is_dry: bool = False,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -187,6 +188,7 @@ def run_suite(
       shard: whose episodes alone are run, with the summaries of the evaluations in which it has some.
       own_parts: the parts, instead of those in `SUITES`.
       body: what is driven, as the option of `TaskOptions` has it.
+      is_dry: whether to say what the suite may cost and to run nothing.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -237,6 +239,10 @@ def run_suite(
         key: shard.numbers((plans.get(key) or plans[key[0], firsts[key[1]]]).trials, position)
         for position, key in enumerate(chosen)
     }
+
+    say_cost(((plans.get(key) or plans[key[0], firsts[key[1]]], len(episodes[key])) for key in chosen), is_dry)
+    if is_dry:
+        return []
 
     def jobs() -> Iterator[Job]:
         for key in chosen:

@@ -160,7 +160,7 @@ class Summary(_Stored):
     overall: Figures
     by_distance: dict[str, Figures]
     pairs: dict[Name, PairFigures] = {}  # by maze, of the older maps that were shown
-    counts: dict[str, int] = {}  # sums of the whole numbers that the agent noted of episodes
+    counts: dict[str, int | float] = {}  # sums of the whole numbers that the agent noted of episodes, and of money
     by_fact: dict[str, Figures] = {}  # of the groups that a track tells apart: "blocked", "not blocked", kinds of mazes
 
     @property
