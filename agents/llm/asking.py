@@ -21,7 +21,7 @@ from .situation import Question, Situation, picture, prompt
 if TYPE_CHECKING:
     from .service import Service
 
-TEXT, PICTURE = "prompt.txt", "picture.png"
+TEXT, PICTURE, NUMBERED = "prompt.txt", "picture.png", "picture-{}.png"
 
 
 class Asking:
@@ -63,7 +63,8 @@ class Asking:
     def _ask_person(self, situation: Situation, question: Question) -> Answer:
         """Returns the line that a person types, with the seconds that it took."""
         text = self._write(situation, question)
-        print(f"\n{text}\n\npicture: {self._folder and self._folder / PICTURE}\nYour decision:", flush=True)
+        name = PICTURE if not question.pictures else NUMBERED.format(1)
+        print(f"\n{text}\n\npicture: {self._folder and self._folder / name}\nYour decision:", flush=True)
         began, line = time.monotonic(), sys.stdin.readline()
         stopping.check()
         if not line:
@@ -77,7 +78,7 @@ class Asking:
         """
         text = "\n\n".join((question.instruction, question.text))
         if self._folder:
-            pictures = {f"picture-{number}.png": png for number, png in enumerate(question.pictures, 1)}
+            pictures = {NUMBERED.format(number): png for number, png in enumerate(question.pictures, 1)}
             for name, png in (pictures or {PICTURE: to_png(picture(situation))}).items():
                 write_file(self._folder / name, png)
             (self._folder / TEXT).write_text(f"{text}\n", encoding="utf-8")

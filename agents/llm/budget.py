@@ -59,17 +59,9 @@ class Tries:
 
     def __init__(self, budget: Budget, messages: list[dict[str, Any]]):
         self._budget, self._most = budget, budget.most(messages)
-        self.number, self._lost = 0, 0
-        self._answer: Answer | None = None
-
-    @property
-    def answer(self) -> Answer | None:
-        """The answer, once a try had one, with the tokens of tries that were lost."""
-        return self._answer and self._answer.model_copy(update={"lost_tokens": self._lost})
-
-    @answer.setter
-    def answer(self, answer: Answer) -> None:
-        self._answer = answer
+        self.number = 0  # of those that began
+        self.lost_tokens = 0  # the most that those may have taken which had no reply
+        self.answer: Answer | None = None  # once a try had one
 
     @contextlib.contextmanager
     def next(self, costs_nothing: tuple[type[Exception], ...]) -> Iterator[None]:
@@ -85,14 +77,14 @@ class Tries:
         spent = 0
         try:
             yield
-            if self._answer is not None:
-                spent = _tokens(self._answer) or self._most
-                self._budget.lacks_usage |= not _tokens(self._answer)
+            if self.answer is not None:
+                spent = _tokens(self.answer) or self._most
+                self._budget.lacks_usage |= not _tokens(self.answer)
         except costs_nothing:
             raise
         except Exception:
             spent = self._most
-            self._lost += spent
+            self.lost_tokens += spent
             raise
         finally:
             self._budget.end(self._most, spent)

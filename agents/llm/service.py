@@ -22,7 +22,7 @@ from .config import SHORTEST_KEY, LLMConfig
 
 _LARGEST_REPLY = 2**24  # bytes
 _LARGEST_COUNT = 2**53  # tokens that are still believed
-_LOOPBACK = ("127.0.0.1", "localhost", "[::1]")  # never by a proxy
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")  # never by a proxy
 _OF_TRANSFER = ("content-encoding", "content-length", "transfer-encoding")  # headers that a read body has no more
 _NOT_SENT = (httpx2.ConnectError, httpx2.ConnectTimeout)
 
@@ -85,12 +85,10 @@ class _Http(httpx2.Client):
         if self._secret:
             self._sent["Authorization"] = f"Bearer {self._secret}"
         self.asking = threading.local()  # its `tries` are those of the question that a thread asks
-        is_local = self.url.host in (name.strip("[]") for name in _LOOPBACK)
-        proxies = urllib.request.getproxies()
-        skips = urllib.request.proxy_bypass(self.url.host)
-        self.is_proxied = not is_local and not skips and bool({self.url.scheme, "all"} & proxies.keys())
-        direct = {f"all://{name}": None for name in _LOOPBACK}
-        super().__init__(timeout=self._longest, limits=httpx2.Limits(max_connections=None), mounts=direct)
+        is_near = self.url.host in _LOOPBACK or bool(urllib.request.proxy_bypass(self.url.host))
+        self.is_proxied = not is_near and bool({self.url.scheme, "all"} & urllib.request.getproxies().keys())
+        unlimited = httpx2.Limits(max_connections=None)
+        super().__init__(timeout=self._longest, limits=unlimited, trust_env=self.url.host not in _LOOPBACK)
 
     def hide(self, text: str) -> str:
         """Returns a text of a service without the key."""
@@ -112,7 +110,7 @@ class _Http(httpx2.Client):
                 follow_redirects=False,
             )
             with contextlib.closing(response):
-                body = b""
+                body = bytearray()
                 for part in response.iter_bytes():
                     body += part
                     if len(body) > _LARGEST_REPLY:
@@ -120,11 +118,12 @@ class _Http(httpx2.Client):
                     if time.monotonic() - began > self._longest:
                         raise httpx2.ReadTimeout(f"expected a reply within {self._longest:g} s")
             if response.is_success:
-                answer = answer_of(body)
+                answer = answer_of(bytes(body))
                 texts = {name: self.hide(getattr(answer, name)) for name in ("text", "model", "finish_reason")}
-                tries.answer = answer.model_copy(update={**texts, "seconds": time.monotonic() - began})
+                told = {"lost_tokens": tries.lost_tokens, "seconds": time.monotonic() - began}
+                tries.answer = answer.model_copy(update={**texts, **told})
         headers = [(name, value) for name, value in response.headers.multi_items() if name not in _OF_TRANSFER]
-        return httpx2.Response(response.status_code, headers=headers, content=body, request=request)
+        return httpx2.Response(response.status_code, headers=headers, content=bytes(body), request=request)
 
 
 class NoAnswerError(httpx2.RequestError):

@@ -22,9 +22,9 @@ def prompt(
     values: dict[str, Any],
     episode: Annotated[int, typer.Option(min=0, help="Number of the episode in the evaluation's order.")] = 0,
     decision: Annotated[int, typer.Option(min=1, help="Which question of it; those before are answered.")] = 1,
-    out: Annotated[pathlib.Path, typer.Option(help="Folder for prompt.txt and picture.png.")] = pathlib.Path("prompt"),
+    out: Annotated[pathlib.Path, typer.Option(help="Folder for prompt.txt and its pictures.")] = pathlib.Path("prompt"),
 ) -> None:
-    """Show what a language model or a person is asked, as text and as a picture; nobody is asked."""
+    """Show what a language model or a person is asked, as text and as pictures; nobody is asked."""
     load_mujoco(renders=False)
     from mazebench.evaluation.chunk import run_trials
     from mazebench.evaluation.plan import build_agent, make_plan
@@ -36,7 +36,8 @@ def prompt(
         raise InputError(f"expected an episode from 0 to {len(plan.trials) - 1}, found {episode}")
     make_folder(out)
     text = out / "prompt.txt"
-    text.unlink(missing_ok=True)
+    for before in (text, *out.glob("picture-?.png")):
+        before.unlink(missing_ok=True)
     agent = build_agent(plan.options, plan.task, plan.agent_class, out)
     for _ in run_trials(agent, plan.task, {episode: plan.trials[episode]}, 1, seed=plan.options.seed):
         if text.exists():
