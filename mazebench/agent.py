@@ -99,6 +99,9 @@ class AgentConfig(Options):
         return self.needs_one_process
 
 
+NO_CONFIG = AgentConfig()  # of an agent whose class declares none
+
+
 class _Declarations:
     """Declarations that the class of an agent may make; each has a default."""
 

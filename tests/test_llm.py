@@ -535,8 +535,8 @@ class TestService:
     def test_a_reply_has_a_largest_size_and_a_longest_time(self, serve, monkeypatch):
         service = serve({1: "drips"}.get)
         service.reply = reply("WAIT " * 100)
-        config = LLMConfig(**service.config | {"max_retries": 0, "timeout": 0.5})
-        with pytest.raises(RunError, match=r"ReadTimeout: expected a reply within 0\.5 s"):
+        config = LLMConfig(**service.config | {"max_retries": 0, "timeout": 2})
+        with pytest.raises(RunError, match=r"ReadTimeout: expected a reply within 2 s"):
             ask_service(config)
         monkeypatch.setattr("mazebench_agents.llm.service._LARGEST_REPLY", 400)
         with pytest.raises(RunError, match="RemoteProtocolError: expected at most 400 bytes, found more"):
@@ -750,6 +750,8 @@ class TestAgents:
         [
             ("llm", {}, InputError, "expected --set model=NAME and --set base_url=http"),
             ("llm", {"overrides": {"model": "m", "extra": "[1]"}}, InputError, "expected extra as a JSON object"),
+            ("llm-hope", {"overrides": {"see": "map"}}, InputError, "expected see=text of a script, which reads words"),
+            ("llm", {"overrides": {"see": "film"}}, InputError, "unknown see 'film'; available: both, egocentric, map"),
             ("llm", {"overrides": {"colour": "red"}}, InputError, "unknown config key 'colour'"),
             ("random", {"overrides": {"mode": "told"}}, InputError, "has no config in evaluations, found --set mode"),
             ("llm-hope", {"task": "rough"}, UnplayableError, "expected the building's 31 x 31 cells, found 62 x 62"),

@@ -16,6 +16,7 @@ from .budget import Budget, Tries
 from .config import LLMConfig
 from .pictures import to_png
 from .scripted import SCRIPTS, hope
+from .situation import TEXT as WORDS
 from .situation import Question, Situation, picture, prompt
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class Asking:
             )
             found = f"model {config.model!r} and {'a' if config.base_url else 'no'} base_url"
             raise InputError(f"agent 'llm': expected {expected}, or a model person:NAME or script:NAME; found {found}")
+        if self._kind == "script" and config.see != WORDS:
+            raise InputError(f"agent 'llm': expected see={WORDS} of a script, which reads words, found {config.see}")
         if not is_known:
             try:
                 from .service import Service

@@ -77,7 +77,7 @@ def _read_url(url: Any) -> str:
 def _read_price(text: Any) -> str:
     """Returns two prices as they were given, or an empty text."""
     try:
-        prices = [float(each) for each in text.split(",")] if text else [0.0, 0.0]
+        prices = [float(each) for each in (text or "0,0").split(",")]
     except ValueError:
         prices = []
     if len(prices) != 2 or not all(0 <= each < math.inf for each in prices):
@@ -143,18 +143,20 @@ class LLMConfig(AgentConfig):
         line = f"{episodes:,} episodes, {each}: some {questions:,} questions, "
         line += f"{read / 1e6:,.2g} million tokens in, at most {written / 1e6:,.2g} million out"
         if self.price:
-            dollars = [
-                self.sums({f"{way}put_tokens": number})["dollars"] for way, number in (("in", read), ("out", written))
-            ]
-            line += "; some {:,.2f} dollars in, at most {:,.2f} out".format(*dollars)
+            before, after = self._prices
+            line += f"; some {before * read:,.2f} dollars in, at most {after * written:,.2f} out"
         return line
 
     def sums(self, counts: Mapping[str, float]) -> dict[str, float]:
         """Returns the dollars of tokens, if their price is known."""
-        if not self.price:
-            return {}
-        prices = zip(self.price.split(","), ("input_tokens", "output_tokens"), strict=True)
-        return {"dollars": round(sum(float(price) * counts.get(name, 0) for price, name in prices) / 1e6, 4)}
+        before, after = self._prices
+        dollars = before * counts.get("input_tokens", 0) + after * counts.get("output_tokens", 0)
+        return {"dollars": round(dollars, 4)} if self.price else {}
+
+    @property
+    def _prices(self) -> list[float]:
+        """The dollars of a token in and out; 0 if they are not known."""
+        return [float(each) / 1e6 for each in (self.price or "0,0").split(",")]
 
     @property
     def needs_one_process(self) -> bool:

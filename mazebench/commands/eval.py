@@ -104,23 +104,13 @@ def evaluate(
         with stopping.stoppable(how_to_go_on, waits=True):
             with progress.evaluating(title, kept) as show:
                 summing = functools.partial(show, sums_up=True)
+                how: dict[str, Any] = {"shard": share, "is_dry": dry_run}
                 if suite is None:
-                    summary = run_evaluation(options, folder, run, show, summing=summing, shard=share, is_dry=dry_run)
+                    summary = run_evaluation(options, folder, run, show, summing=summing, **how)
                     summaries = [summary] if summary else []
                 else:
                     chosen = {name: getattr(options, name) for name in ("checkpoint", "seed", "overrides")}
-                    summaries = run_suite(
-                        suite,
-                        agents,
-                        folder,
-                        run,
-                        show,
-                        summing,
-                        shard=share,
-                        body=task.body,
-                        is_dry=dry_run,
-                        **chosen,
-                    )
+                    summaries = run_suite(suite, agents, folder, run, show, summing, body=task.body, **how, **chosen)
             if dry_run:
                 return
             if shard is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pydantic_core
 
-from mazebench.agent import Agent, AgentConfig, Inputs, Report
+from mazebench.agent import NO_CONFIG, Agent, AgentConfig, Inputs, Report
 from mazebench.agent_loading import source_line
 from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, RunError, describe_error
@@ -54,14 +54,14 @@ def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
         return int(agent_class.context_size(size))
 
 
-def sensors_of(agent_class: type[Agent], named: tuple[str, ...], config: AgentConfig | None = None) -> tuple[str, ...]:
+def sensors_of(agent_class: type[Agent], named: tuple[str, ...], config: AgentConfig = NO_CONFIG) -> tuple[str, ...]:
     """Returns the sensors of an agent's task: those named, and those that it needs if only the lidar may be named."""
-    needed = (*agent_class.needs_sensors, *(config.sensor_options if config else ()))
+    needed = (*agent_class.needs_sensors, *config.sensor_options)
     return tuple(dict.fromkeys((*named, *needed))) if named in ((), (LIDAR,)) else named
 
 
 def unread_sensors(
-    name: str, agent_class: type[Agent], task: TaskOptions, config: AgentConfig | None = None
+    name: str, agent_class: type[Agent], task: TaskOptions, config: AgentConfig = NO_CONFIG
 ) -> str | None:
     """Returns a line that names the sensors of a task that the agent `name` does not read; None if it reads all.
 
@@ -69,7 +69,7 @@ def unread_sensors(
     """
     own = () if task.track is None else (LIDAR,)
     with calling(name, "read_sensors"):
-        read = (*agent_class.read_sensors(task.sensors), *(config.sensor_options if config else ()))
+        read = (*agent_class.read_sensors(task.sensors), *config.sensor_options)
         return unread(f"agent {name!r}", [each for each in task.sensors if each not in own], read)
 
 

@@ -134,9 +134,9 @@ def say_cost(plans: Iterable[tuple[Plan, int]], is_dry: bool) -> None:
         first, before = of_agents.get(plan.options.agent, (plan, 0))
         of_agents[plan.options.agent] = first, before + episodes
     for name, (plan, episodes) in of_agents.items():
-        line = plan.cost(episodes) or (f"{name}: {episodes:,} episodes, which cost nothing" if is_dry else "")
-        if line:
-            remark(line)
+        line = plan.config.cost(episodes, plan.task.size)
+        if line or is_dry:
+            remark(f"{name}: {line or f'{episodes:,} episodes, which cost nothing'}")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -240,7 +240,7 @@ def _finish(job: Job, store: Store, num_envs: int, summing: Progress) -> Summary
             for older in plan.task.arena.shown or ()
             if older.pair is not None
         },
-        counts=plan.summed(counts_in(records)),
+        counts={**(counts := counts_in(records)), **plan.config.sums(counts)},
     )
     store.finish(records, summary)
     return summary

@@ -10,7 +10,7 @@ import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from mazebench.agent import Agent, AgentConfig
+from mazebench.agent import NO_CONFIG, Agent, AgentConfig
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import EPISODES_PER_DISTANCE, FROZEN_PER_MAZE
 from mazebench.errors import InputError, RunError, UnplayableError, remark
@@ -68,35 +68,26 @@ class Plan:
         return self._learned_scale not in (None, self._scale)
 
     @property
+    def config(self) -> AgentConfig:
+        """The agent's config with the values that were asked for; an empty one if its class declares none."""
+        return config_of(self.options, self.agent_class) or NO_CONFIG
+
+    @property
     def chosen_config(self) -> dict[str, Any]:
         """The values of the agent's config that are not the default ones and may change results."""
-        configs = config_of(self.options, self.agent_class), self.agent_class.eval_config
-        chosen, usual = (config.identity() if config else {} for config in configs)
+        chosen, usual = self.config.identity(), (self.agent_class.eval_config or NO_CONFIG).identity()
         return {name: value for name, value in chosen.items() if value != usual[name]}
 
     def check_spread(self, workers: int, machines: bool = False) -> None:
         """Raises `InputError` if the agent's config rules out worker processes or other machines that are asked for."""
-        config = config_of(self.options, self.agent_class)
-        if machines and config is not None and config.needs_one_machine:
+        if machines and self.config.needs_one_machine:
             raise InputError(f"agent {self.options.agent!r}: expected one machine, found a cluster, executor or shard")
-        if workers and config is not None and config.needs_one_process:
+        if workers and self.config.needs_one_process:
             raise InputError(f"agent {self.options.agent!r}: expected no --workers with this config, found {workers}")
-
-    def cost(self, episodes: int) -> str:
-        """Returns a line on what so many episodes may cost; an empty one if nothing."""
-        config = config_of(self.options, self.agent_class)
-        line = config.cost(episodes, self.task.size) if config else ""
-        return f"{self.options.agent}: {line}" if line else ""
-
-    def summed(self, counts: dict[str, int]) -> dict[str, float]:
-        """Returns sums of what the agent noted with those that its config makes of them."""
-        config = config_of(self.options, self.agent_class)
-        return {**counts, **(config.sums(counts) if config else {})}
 
     def say_remarks(self, *, of_maps: bool = True) -> None:
         """Warns of the sensors that the agent does not read and, with `of_maps`, of maps for which it is not made."""
-        config = config_of(self.options, self.agent_class)
-        unread = unread_sensors(self.options.agent, self.agent_class, self.task.options, config)
+        unread = unread_sensors(self.options.agent, self.agent_class, self.task.options, self.config)
         for line in (self.remark if of_maps else None, unread):
             if line:
                 remark(line)
@@ -208,7 +199,7 @@ def make_plan(
     """
     agent_class = agent_class or load_agent_class(options.agent)
     config = config_of(options, agent_class)
-    task = task_as_played(options.agent, agent_class, task or options.task, resolver, config)
+    task = task_as_played(options.agent, agent_class, task or options.task, resolver, config or NO_CONFIG)
     _check_episodes(options, task.options)
     options = _with_checkpoint(options, agent_class)
     if task.options.track is None or task.options.mazes is None:
@@ -263,7 +254,7 @@ def task_as_played(
     agent_class: type[Agent],
     asked: TaskOptions | Task,
     resolver: Callable[..., Task],
-    config: AgentConfig | None = None,
+    config: AgentConfig = NO_CONFIG,
 ) -> Task:
     """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps.
 
@@ -277,7 +268,7 @@ def task_as_played(
     if options.actions is None and "six" not in plays:
         chosen["actions"] = plays[0]
     chosen["sensors"] = sensors_of(agent_class, options.sensors, config)
-    for sensor, values in config.sensor_options.items() if config else ():
+    for sensor, values in config.sensor_options.items():
         chosen |= values if sensor in chosen["sensors"] and sensor not in options.sensors else {}
     if isinstance(asked, TaskOptions):
         chosen["context_size"] = None
