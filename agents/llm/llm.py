@@ -189,7 +189,7 @@ class LLM(Agent):
         return driver
 
     def _look(self, driver: _Driver, picture: np.ndarray) -> None:
-        """Takes in what the camera sees. Of the cells before, views are kept where the robot turned."""
+        """Takes in what the camera sees. Of the cells before, views are kept where its way turned."""
         situation = driver.situation
         is_all_round = self._camera is not None and self._camera.fov == 360
         yaw = situation.pose[2]
