@@ -39,7 +39,8 @@ def evaluate(
             "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
             "tracks-camera and tracks-camera-dev, by camera alone; tracks-goals and tracks-goals-dev, three goals in "
             "a row where doors have moved; real and real-dev, real buildings with right, changed, old and no maps; "
-            "real-camera, by camera alone; llm and llm-dev, a few episodes, for agents whose answers cost."
+            "real-camera, by camera alone; llm and llm-dev, a few episodes, for agents whose answers cost; people-dev, "
+            "twelve episodes, for people."
         ),
     ] = None,
     out: Annotated[

@@ -101,12 +101,13 @@ def run_evaluation(
     executor: concurrent.futures.Executor | None = None,
     shard: Shard = WHOLE,
     summing: Progress = lambda ended, of: None,
+    pool: Pool | None = None,
 ) -> Summary | None:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
     `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
     already. Of a `shard` without episodes, None is returned. `summing` is called as the oracle's drives end, which are
-    measured after the last episode.
+    measured after the last episode. `pool` runs the episodes instead of the one that `run` asks for.
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
@@ -117,7 +118,7 @@ def run_evaluation(
             f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
         )
     episodes = shard.numbers(plan.trials)
-    with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
+    with pool_of(run, executor, pool) as pool, tempfile.TemporaryDirectory() as temporary:
         job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
         summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None
