@@ -18,6 +18,7 @@ from mazebench.commands.option_parameters import takes_options
 from mazebench.errors import InputError
 from mazebench.evaluation.eval_options import EPISODES, EvalOptions, RunOptions
 from mazebench.options import fields_of, options_in
+from mazebench.play.person import read_name
 from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.sensors.cameras import CameraOptions
 from mazebench.tasks.task import NOT_IN_EVALUATIONS, resolve_for_evaluation
@@ -31,7 +32,7 @@ _WITHOUT = (
     *fields_of(RunOptions).keys() - {"resume"},  # a person drives one robot at a time
 )
 _SENSES: dict[str, dict[str, Any]] = {
-    "camera": {"sensors": ("egocentric",), "camera_size": 320, "camera_fov": 90.0},
+    "camera": {"sensors": ("egocentric",), "camera_size": 320, "camera_fov": 110.0},
     "lidar": {"sensors": (LIDAR,)},
 }
 
@@ -55,6 +56,7 @@ def play(
     ] = None,
 ) -> None:
     """Drive the episodes of an evaluation yourself, on a page in a browser on this machine."""
+    name = read_name(name)
     if values.get("resume") and out is None:
         raise InputError("--resume needs --out, the folder of the run")
     chosen = {*CameraOptions.__annotations__, "body", "actions"}  # also of a suite

@@ -103,7 +103,7 @@ function draw() {
   drawWalls(pen, plane);
   drawWay(pen, view.trail, plane.side, "you");
   drawEnds(pen, view.start, view.goal, plane.side);
-  if (view.trail.length) drawBody(pen, view.trail[view.trail.length - 1], plane.side);
+  if (view.trail.length) drawBody(pen, view.trail[view.trail.length - 1], unit(plane.side));
   if (view.phase === "end") drawBuilding();
   else if (view.ranges) drawRanges();
 }
@@ -164,11 +164,11 @@ function drawWay(pen, way, side, name) {
   pen.stroke();
 }
 
-function drawBody(pen, [x, y, yaw], side) {
+function drawBody(pen, [x, y, yaw], scale) {
   pen.save();
   pen.translate(x, y);
   pen.rotate(-yaw);
-  pen.scale(unit(side), unit(side));
+  pen.scale(scale, scale);
   pen.fillStyle = color("you");
   pen.strokeStyle = color("floor");
   pen.lineWidth = 0.12;
@@ -222,7 +222,7 @@ function drawRanges() {
     if (isWall) pen.arc(x, y, 0.07, 0, 2 * Math.PI);
     pen.fill();
   }
-  drawBody(pen, [0, 0, Math.PI / 2], 24 * view.radius);
+  drawBody(pen, [0, 0, Math.PI / 2], 1.5 * view.radius);
 }
 
 addEventListener("keydown", (event) => {

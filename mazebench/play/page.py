@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import pathlib
 import secrets
 import time
@@ -44,14 +45,15 @@ class Page:
         self._socket: web.WebSocketResponse | None = None  # of the page that drives
         self._view: dict[str, Any] = {"number": 0, "phase": "wait"}
         self._held: list[str] = []  # the keys that are down
-        self._pressed: list[str] = []  # that were down since the view was shown
+        self._seen = 0  # the number of the view in which they are
+        self._pressed: list[str] = []  # the keys that were down when one of them was pressed in this view
         self._changed = asyncio.Event()  # a page has connected or sent keys
         self._next_step = 0.0  # s, when the next step may be taken
         app = web.Application(middlewares=[self._guard])
         app.router.add_get(f"/{self._token}/socket", self._connect)
         for name, file in (("", "page.html"), ("page.js", "page.js"), ("page.css", "page.css")):
             app.router.add_get(f"/{self._token}/{name}", _sender(_FOLDER / file))
-        self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=0)
+        self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)  # pages are not waited for
 
     @property
     def address(self) -> str:
@@ -76,7 +78,7 @@ class Page:
 
     async def _wait(self, real_time: bool) -> None:
         await asyncio.sleep(self._next_step - time.monotonic())
-        while not (self._pressed or (real_time and self._socket is not None)):
+        while not (self._pressed or (self._held and self._is_seen) or (real_time and self._socket is not None)):
             self._changed.clear()
             await self._changed.wait()
 
@@ -112,10 +114,16 @@ class Page:
             message = _Message.model_validate_json(text)
         except pydantic.ValidationError:
             return
+        before, self._seen = self._held, message.number
         self._held = [key for key in message.keys if key in self._view.get("keys", ())]
-        if self._held and message.number == self._view["number"]:
+        if self._is_seen and not {*before}.issuperset(self._held):
             self._pressed = self._held
-            self._changed.set()
+        self._changed.set()
+
+    @property
+    def _is_seen(self) -> bool:
+        """True if the page has the view, so that steps do not run ahead of it."""
+        return bool(self._seen == self._view["number"])
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
@@ -141,7 +149,7 @@ class Page:
         try:
             self._run(self._start())
         except OSError as error:
-            raise InputError(f"expected --port that is free, found {self._port}: {error.strerror}") from error
+            raise InputError(f"expected --port that is free, found {self._port}: {os.strerror(error.errno or 0)}") from error
         return self
 
     def __exit__(self, *error: object) -> None:
