@@ -90,6 +90,8 @@ function show() {
   byId("of-lidar").hidden = hasEnded || !view.ranges;
   byId("of-building").hidden = !hasEnded;
   byId("view").hidden = !hasEnded && !view.ranges;
+  byId("has-start").hidden = !view.start;
+  byId("has-goal").hidden = !view.goal;
   byId("you").hidden = !view.trail.length;
   byId("lost").hidden = view.trail.length > 0;
   if (view.camera) byId("camera").src = view.camera;
@@ -200,7 +202,7 @@ function drawRanges() {
   const side = 2.1 * view.reach, pen = penOf("view", side);
   pen.translate(side / 2, side / 2);
   pen.strokeStyle = color("line");
-  pen.lineWidth = 0.02;
+  pen.lineWidth = 0.03;
   for (let radius = 1; radius <= view.reach; radius++) {
     pen.beginPath();
     pen.arc(0, 0, radius, 0, 2 * Math.PI);
@@ -222,7 +224,7 @@ function drawRanges() {
     if (isWall) pen.arc(x, y, 0.07, 0, 2 * Math.PI);
     pen.fill();
   }
-  drawBody(pen, [0, 0, Math.PI / 2], 1.5 * view.radius);
+  drawBody(pen, [0, 0, Math.PI / 2], 2.2 * view.radius);
 }
 
 addEventListener("keydown", (event) => {

@@ -45,14 +45,14 @@ class Page:
         self._socket: web.WebSocketResponse | None = None  # of the page that drives
         self._view: dict[str, Any] = {"number": 0, "phase": "wait"}
         self._held: list[str] = []  # the keys that are down
-        self._seen = 0  # the number of the view in which they are
+        self._seen = 0  # the number of the view that the page has
         self._pressed: list[str] = []  # the keys that were down when one of them was pressed in this view
         self._changed = asyncio.Event()  # a page has connected or sent keys
         self._next_step = 0.0  # s, when the next step may be taken
         app = web.Application(middlewares=[self._guard])
         app.router.add_get(f"/{self._token}/socket", self._connect)
-        for name, file in (("", "page.html"), ("page.js", "page.js"), ("page.css", "page.css")):
-            app.router.add_get(f"/{self._token}/{name}", _sender(_FOLDER / file))
+        for name in ("", "page.js", "page.css"):
+            app.router.add_get(f"/{self._token}/{name}", self._send_file)
         self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)  # pages are not waited for
 
     @property
@@ -108,6 +108,9 @@ class Page:
             self._socket, self._held = None, []
         return socket
 
+    async def _send_file(self, request: web.Request) -> web.FileResponse:
+        return web.FileResponse(_FOLDER / (request.path.rpartition("/")[2] or "page.html"))
+
     def _take(self, text: str) -> None:
         """Takes note of the keys in a message; one that can't be read is passed over."""
         try:
@@ -149,30 +152,14 @@ class Page:
         try:
             self._run(self._start())
         except OSError as error:
-            raise InputError(f"expected --port that is free, found {self._port}: {os.strerror(error.errno or 0)}") from error
+            fault = os.strerror(error.errno or 0)
+            raise InputError(f"expected --port that is free, found {self._port}: {fault}") from error
         return self
 
     def __exit__(self, *error: object) -> None:
         for work in (self._runner.cleanup(), self._loop.shutdown_asyncgens()):
             self._loop.run_until_complete(work)
         self._loop.close()
-
-
-def _sender(path: pathlib.Path) -> Any:
-    """Returns a handler that sends a file."""
-    kind = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}[path.suffix]
-
-    async def send(request: web.Request) -> web.Response:
-        headers = {
-            "Cache-Control": "no-store",
-            "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
-            f"connect-src 'self' ws://{request.host}",
-            "Referrer-Policy": "no-referrer",
-            "X-Content-Type-Options": "nosniff",
-        }
-        return web.Response(text=path.read_text(encoding="utf-8"), content_type=kind, charset="utf-8", headers=headers)
-
-    return send
 
 
 async def _send(socket: web.WebSocketResponse, view: dict[str, Any]) -> None:

@@ -1,6 +1,6 @@
 """The views of an episode on the page: what the person is shown of each moment, and what came of it.
 
-A plane has `M` pixels a side, of which `pixel` are lengths on the page; y goes down there.
+On the page, a plane of `M` x `M` has places (x, y) in its pixels, y down from the upper edge.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from mazebench.agent import Observation
-from mazebench.constants import STEP_TIME, YAW, X, Y
+from mazebench.constants import ON_TIME, STEP_TIME, YAW, X, Y
 from mazebench.evaluation.chunk import Result, to_record
 from mazebench.evaluation.plan import Plan
 from mazebench.play.person import keys_of
@@ -26,7 +26,6 @@ from mazebench.tasks.tracks import TRACKS
 
 CAMERA = "egocentric"
 _JPEG_QUALITY = 90
-_FACTOR = float(ON_TIMES[0].key)  # of the oracle's steps
 
 
 class Scene:
@@ -80,16 +79,15 @@ class Scene:
 
     def end(self, result: Result, oracle: Result) -> dict[str, Any]:
         """Returns what is shown of the end, besides the last moment: the result, the oracle's, and the building."""
-        plan = self._plan
-        maze, episode = plan.task.mazes[self._plan.trials[self._number].episode.maze], plan.trials[self._number].episode
+        plan, episode = self._plan, self._plan.trials[self._number].episode
         oracle_steps = oracle.steps if oracle.success else None
         record = to_record(plan, result).model_copy(update={"oracle_steps": oracle_steps})
         verdict = "On time" if ON_TIMES[0].of([record])[0] else "Late" if result.success else "Out of time"
         words = f"You reached the goal after {result.steps * STEP_TIME:.1f} s" if result.success else "The time is up"
         if oracle_steps is not None:
             words += f"; the oracle, which knows the building, needs {oracle_steps * STEP_TIME:.1f} s."
-            words += f" Up to {_FACTOR * oracle_steps * STEP_TIME:.1f} s are on time."
-        shown, walls = self._shown.walls, maze.walls
+            words += f" Up to {ON_TIME[0] * oracle_steps * STEP_TIME:.1f} s are on time."
+        shown, walls = self._shown.walls, plan.task.mazes[episode.maze].walls
         differs = np.argwhere(shown != walls).tolist() if shown.shape == walls.shape else []
         return {
             **self._last,
