@@ -83,7 +83,7 @@ def to_goal(view: dict[str, Any]) -> list[str]:
     """Turns to the goal and drives, where nothing stands in the way; after the end, goes on."""
     if view["phase"] == "end":
         return ["next"]
-    (x, y, yaw), (row, column) = view["trail"][-1], view["goal"]
+    (x, y, yaw), (row, column) = view["trail"][-1], divmod(view["goal"], view["side"])
     angle = math.remainder(math.atan2(y - row - 0.5, column + 0.5 - x) - yaw, 2 * math.pi)
     return ["forward"] if abs(angle) < 0.3 else ["look_left" if angle > 0 else "look_right"]
 
@@ -116,7 +116,7 @@ class TestEvaluation:
         assert (first["phase"], first["number_of"], first["name"]) == ("drive", [1, 2], NAME)
         assert (first["seconds"], second["seconds"]) == (0, 0.16)
         assert first["limit"] == pytest.approx(0.16 * 100)
-        row, column = first["start"]
+        row, column = divmod(first["start"], first["side"])
         assert first["trail"][0][:2] == [column + 0.5, row + 0.5]
         assert first["camera"].startswith("data:image/jpeg;base64,")
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import datetime
 import functools
-import os
 import pathlib
 from typing import Annotated, Any, Literal
 
@@ -68,10 +66,9 @@ def play(
         from mazebench.play.session import Session
     except ImportError as error:
         raise InputError(f"mazebench play needs {error.name}, which the extra [play] brings (docs/play.md)") from error
-    from mazebench.commands.summary_table import print_suite, print_summary
+    from mazebench.commands.summary_table import print_summaries
     from mazebench.evaluation.evaluate import run_evaluation
     from mazebench.evaluation.suites import parts_of, run_suite
-    from mazebench.results.reading import load_result, read_suite
 
     # What is driven.
     task = TaskOptions(**_SENSES[view] | options_in(values, TaskOptions))
@@ -87,16 +84,12 @@ def play(
     asked = {"agent": _AGENT, "overrides": {"name": name}, **options_in(values, EvalOptions)}
     options = EvalOptions(task=task, **number | asked)
     run = RunOptions(record=True, resume=values.get("resume", False))
-    when = f"{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
-    folder = out or pathlib.Path("results") / f"{suite or f'{_AGENT}-{task.task}'}-{when}"
-    kept = progress.Kept()
-
-    def how_to_go_on() -> tuple[str, ...]:
-        if kept.of is None and not folder.exists():
-            return ("nothing was begun; run it again",)
-        return (f"{kept} in {folder}; go on", *(() if out else ("--out", str(folder))), "--resume")
-
-    with stopping.stoppable(how_to_go_on, waits=True), Page(port) as page, Session(page, name, real_time) as session:
+    folder, kept = out or progress.new_folder(suite or f"{_AGENT}-{task.task}"), progress.Kept()
+    with (
+        stopping.stoppable(lambda: kept.how_to_go_on(folder, out is not None), waits=True),
+        Page(port) as page,
+        Session(page, name, real_time) as session,
+    ):
         print(f"open {page.address} in a browser on this machine; Ctrl-C ends, and --resume goes on", flush=True)
         with progress.evaluating(f"{name or _AGENT}, {suite or task.task}", kept) as show:
 
@@ -116,9 +109,5 @@ def play(
                     suite, [_AGENT], folder, run, advance, summing, overrides=overrides, own_parts=parts, pool=session
                 )
         page.show({"phase": "over", "words": f"All {kept.of} episodes have ended. The results are in {folder}."})
-    if suite is None:
-        print_summary(summaries[0])
-    else:
-        folders = [folder / read_suite(folder).folders[each.agent] / str(each.part) for each in summaries]
-        print_suite([load_result(each) for each in folders])
+    print_summaries(summaries, folder)
     print(f"results in {folder}")

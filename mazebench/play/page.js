@@ -7,7 +7,7 @@ const KEYS = {
   ArrowRight: "look_right", KeyD: "look_right", KeyQ: "strafe_left", KeyE: "strafe_right",
 };
 const byId = (id) => document.getElementById(id);
-const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
+const data = { units: { position: 1, yaw: 2 * Math.PI } }; // of canvas.js
 let view = {}, held = [], socket;
 
 function connect() {
@@ -90,8 +90,8 @@ function show() {
   byId("of-lidar").hidden = hasEnded || !view.ranges;
   byId("of-building").hidden = !hasEnded;
   byId("view").hidden = !hasEnded && !view.ranges;
-  byId("has-start").hidden = !view.start;
-  byId("has-goal").hidden = !view.goal;
+  byId("has-start").hidden = view.start < 0;
+  byId("has-goal").hidden = view.goal < 0;
   byId("you").hidden = !view.trail.length;
   byId("lost").hidden = view.trail.length > 0;
   if (view.camera) byId("camera").src = view.camera;
@@ -99,92 +99,47 @@ function show() {
   draw();
 }
 
+// Marks and walls are drawn by canvas.js, whose unit is a cell.
 function draw() {
   if (!view.title) return;
-  const plane = planeOf(view.map), pen = penOf("map", plane.side);
-  drawWalls(pen, plane);
-  drawWay(pen, view.trail, plane.side, "you");
-  drawEnds(pen, view.start, view.goal, plane.side);
-  if (view.trail.length) drawBody(pen, view.trail[view.trail.length - 1], unit(plane.side));
-  if (view.phase === "end") drawBuilding();
-  else if (view.ranges) drawRanges();
+  const color = colors(), pen = prepare(byId("map"), view.side);
+  drawMap(pen, sharesOf(view.map), view.side, color);
+  drawWay(pen, view.trail, view.side, color("you"));
+  drawEnds(pen, view.start, view.goal, view.side, 0.5 * thickness(view.side), color);
+  if (view.trail.length) drawArrow(pen, view.trail[view.trail.length - 1], thickness(view.side), color);
+  if (view.phase === "end") drawBuilding(color);
+  else if (view.ranges) drawLidar(color);
 }
 
-// Shares of wall in bytes, row by row.
-function planeOf(packed) {
-  if (packed === null) return { side: view.side, shares: [] };
-  const shares = Uint8Array.from(atob(packed), (character) => character.charCodeAt(0));
-  return { side: Math.sqrt(shares.length), shares };
+// Shares of wall in bytes, row by row; null of a map that is hidden.
+function sharesOf(packed) {
+  return packed && Array.from(atob(packed), (character) => character.charCodeAt(0) / 255);
 }
 
-// A pen whose unit is a pixel of a plane, on whole pixels of the screen, so that no seams show.
-function penOf(id, side) {
-  const canvas = byId(id), pixels = Math.max(1, Math.round((canvas.clientWidth * (window.devicePixelRatio || 1)) / side)) * side;
-  canvas.width = canvas.height = pixels;
-  const pen = canvas.getContext("2d");
-  pen.scale(pixels / side, pixels / side);
-  pen.lineJoin = pen.lineCap = "round";
-  pen.fillStyle = color("floor");
-  pen.fillRect(0, 0, side, side);
-  return pen;
-}
-
-function drawWalls(pen, { side, shares }) {
-  pen.fillStyle = color("wall");
-  shares.forEach((share, cell) => {
-    pen.globalAlpha = share / 255;
-    if (share) pen.fillRect(cell % side, Math.floor(cell / side), 1, 1);
-  });
-  pen.globalAlpha = 1;
-}
-
-const unit = (side) => Math.max(1, side / 24); // marks of large maps are larger, so that they can be seen
-
-function drawEnds(pen, start, goal, side) {
-  const radius = 0.5 * unit(side);
-  if (start) {
-    pen.strokeStyle = color("start");
-    pen.lineWidth = 0.45 * radius;
-    pen.beginPath();
-    pen.arc(start[1] + 0.5, start[0] + 0.5, 0.8 * radius, 0, 2 * Math.PI);
-    pen.stroke();
-  }
-  pen.fillStyle = color("goal");
-  pen.beginPath();
-  for (let corner = 0; goal && corner < 10; corner++) {
-    const length = (corner % 2 ? 0.65 : 1.5) * radius, angle = (corner * Math.PI) / 5;
-    pen.lineTo(goal[1] + 0.5 + length * Math.sin(angle), goal[0] + 0.5 - length * Math.cos(angle));
-  }
-  pen.fill();
-}
-
-function drawWay(pen, way, side, name) {
-  pen.strokeStyle = color(name);
-  pen.lineWidth = 0.16 * unit(side);
+function drawWay(pen, way, side, color) {
+  pen.strokeStyle = color;
+  pen.lineWidth = 0.16 * thickness(side);
+  pen.lineJoin = "round";
   pen.beginPath();
   for (const [x, y] of way) pen.lineTo(x, y);
   pen.stroke();
 }
 
-function drawBody(pen, [x, y, yaw], scale) {
-  pen.save();
-  pen.translate(x, y);
-  pen.rotate(-yaw);
-  pen.scale(scale, scale);
+function drawArrow(pen, [x, y, yaw], scale, color) {
+  const at = ([ahead, left]) => [x + scale * (ahead * Math.cos(yaw) - left * Math.sin(yaw)), y - scale * (ahead * Math.sin(yaw) + left * Math.cos(yaw))];
   pen.fillStyle = color("you");
   pen.strokeStyle = color("floor");
-  pen.lineWidth = 0.12;
+  pen.lineWidth = 0.12 * scale;
   pen.beginPath();
-  for (const [ahead, left] of [[0.8, 0], [-0.6, 0.5], [-0.3, 0], [-0.6, -0.5]]) pen.lineTo(ahead, -left);
+  for (const corner of [[0.8, 0], [-0.6, 0.5], [-0.3, 0], [-0.6, -0.5]]) pen.lineTo(...at(corner));
   pen.closePath();
   pen.fill();
   pen.stroke();
-  pen.restore();
 }
 
-function drawBuilding() {
-  const plane = planeOf(view.building), pen = penOf("view", plane.side);
-  drawWalls(pen, plane);
+function drawBuilding(color) {
+  const { building, size, ways, ends } = view, pen = prepare(byId("view"), size);
+  drawMap(pen, sharesOf(building), size, color);
   for (const [row, column, isWall] of view.changed) {
     pen.fillStyle = color("closed");
     pen.strokeStyle = color("open");
@@ -192,39 +147,17 @@ function drawBuilding() {
     if (isWall) pen.fillRect(column, row, 1, 1);
     else pen.strokeRect(column + 0.1, row + 0.1, 0.8, 0.8);
   }
-  drawWay(pen, view.ways[0], plane.side, "oracle");
-  drawWay(pen, view.ways[1], plane.side, "you");
-  drawEnds(pen, ...view.ends, plane.side);
+  drawWay(pen, ways[0], size, color("oracle"));
+  drawWay(pen, ways[1], size, color("you"));
+  drawEnds(pen, ...ends, size, 0.5 * thickness(size), color);
 }
 
-// The ranges around the robot, which looks up.
-function drawRanges() {
-  const side = 2.1 * view.reach, pen = penOf("view", side);
-  pen.translate(side / 2, side / 2);
-  pen.strokeStyle = color("line");
-  pen.lineWidth = 0.03;
-  for (let radius = 1; radius <= view.reach; radius++) {
-    pen.beginPath();
-    pen.arc(0, 0, radius, 0, 2 * Math.PI);
-    pen.stroke();
-  }
-  const ends = view.ranges.map((range, ray) => {
-    const angle = (2 * Math.PI * ray) / view.ranges.length;
-    return [-range * Math.sin(angle), -range * Math.cos(angle), range < view.reach];
-  });
-  pen.fillStyle = color("you");
-  pen.globalAlpha = 0.15;
-  pen.beginPath();
-  for (const [x, y] of ends) pen.lineTo(x, y);
-  pen.fill();
-  pen.globalAlpha = 1;
-  pen.fillStyle = color("ink");
-  for (const [x, y, isWall] of ends) {
-    pen.beginPath();
-    if (isWall) pen.arc(x, y, 0.07, 0, 2 * Math.PI);
-    pen.fill();
-  }
-  drawBody(pen, [0, 0, Math.PI / 2], 2.2 * view.radius);
+// The ranges around the robot, which looks up; in metres.
+function drawLidar(color) {
+  const side = Math.ceil(2.1 * view.reach), pen = prepare(byId("view"), side), middle = { x: [side / 2], y: [side / 2], yaw: [Math.PI / 2] };
+  drawMap(pen, null, side, color);
+  drawRays(pen, middle, 0, side, view.ranges, view.reach, color);
+  drawBody(pen, side / 2, side / 2, -Math.PI / 2, view.radius / 0.15, color);
 }
 
 addEventListener("keydown", (event) => {

@@ -22,7 +22,9 @@ from mazebench.constants import STEP_TIME
 from mazebench.errors import InputError
 
 _HOSTS = ("127.0.0.1", "localhost")  # another name in a request is of a page elsewhere that points here
-_FOLDER = pathlib.Path(__file__).parent
+_HERE = pathlib.Path(__file__).parent
+_FILES = {"": _HERE / "page.html", **{name: _HERE / name for name in ("page.js", "page.css")}}
+_FILES["canvas.js"] = _HERE.parent / "report" / "canvas.js"
 _PATIENCE = 0.1  # s between looks for a signal
 _LONGEST_MESSAGE = 4096  # bytes
 
@@ -51,7 +53,7 @@ class Page:
         self._next_step = 0.0  # s, when the next step may be taken
         app = web.Application(middlewares=[self._guard])
         app.router.add_get(f"/{self._token}/socket", self._connect)
-        for name in ("", "page.js", "page.css"):
+        for name in _FILES:
             app.router.add_get(f"/{self._token}/{name}", self._send_file)
         self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)  # pages are not waited for
 
@@ -109,7 +111,7 @@ class Page:
         return socket
 
     async def _send_file(self, request: web.Request) -> web.FileResponse:
-        return web.FileResponse(_FOLDER / (request.path.rpartition("/")[2] or "page.html"))
+        return web.FileResponse(_FILES[request.path.rpartition("/")[2]])
 
     def _take(self, text: str) -> None:
         """Takes note of the keys in a message; one that can't be read is passed over."""

@@ -79,7 +79,7 @@ class Scene:
 
     def end(self, result: Result, oracle: Result) -> dict[str, Any]:
         """Returns what is shown of the end, besides the last moment: the result, the oracle's, and the building."""
-        plan, episode = self._plan, self._plan.trials[self._number].episode
+        plan, task, episode = self._plan, self._plan.task, self._plan.trials[self._number].episode
         oracle_steps = oracle.steps if oracle.success else None
         record = to_record(plan, result).model_copy(update={"oracle_steps": oracle_steps})
         verdict = "On time" if ON_TIMES[0].of([record])[0] else "Late" if result.success else "Out of time"
@@ -87,7 +87,7 @@ class Scene:
         if oracle_steps is not None:
             words += f"; the oracle, which knows the building, needs {oracle_steps * STEP_TIME:.1f} s."
             words += f" Up to {ON_TIME[0] * oracle_steps * STEP_TIME:.1f} s are on time."
-        shown, walls = self._shown.walls, plan.task.mazes[episode.maze].walls
+        shown, walls = self._shown.walls, task.mazes[episode.maze].walls
         differs = np.argwhere(shown != walls).tolist() if shown.shape == walls.shape else []
         return {
             **self._last,
@@ -97,7 +97,8 @@ class Scene:
             "verdict": verdict,
             "words": words,
             "building": _packed(walls),
-            "ends": [episode.start, episode.goal],
+            "size": task.size,
+            "ends": [row * task.size + column for row, column in (episode.start, episode.goal)],
             "changed": [[row, column, bool(walls[row, column])] for row, column in differs],
             "ways": [self._way(each) for each in (oracle, result)],
         }
@@ -114,6 +115,6 @@ def _packed(plane: np.ndarray) -> str:
     return base64.b64encode(np.rint(plane * 255.0).astype(np.uint8).tobytes()).decode()
 
 
-def _marked(plane: np.ndarray) -> list[int] | None:
-    """Returns the row and the column that a plane marks; None if there is none."""
-    return np.argwhere(plane)[0].tolist() if plane.any() else None
+def _marked(plane: np.ndarray) -> int:
+    """Returns the number of the pixel that a plane marks, row by row; -1 if there is none."""
+    return int(plane.argmax()) if plane.any() else -1
