@@ -29,10 +29,11 @@ from mazebench.evaluation.evaluate import evaluate, run_evaluation
 from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.maze import Maze
-from mazebench.play.person import Person
+from mazebench.play.person import Person, keys_of
 from mazebench.results.comparison import compare_folders
 from mazebench.results.reading import load_result
 from mazebench.tasks.task_options import TaskOptions
+from mazebench.world.bodies import BODIES, SLIDER
 
 aiohttp = pytest.importorskip("aiohttp")
 from mazebench.play.page import Page  # noqa: E402
@@ -198,6 +199,12 @@ class TestEvaluation:
 def test_keys_become_an_action(kind, keys, action):
     actions, _ = Person(lambda _: keys, kind).act(Inputs({}, *np.zeros((3, 1))), None)
     assert actions.tolist() == [action]
+
+
+def test_keys_that_would_not_move_the_body_are_not_offered():
+    offered = [len(keys_of(kind, SLIDER)) for kind in ("six", "velocity", "four", "diff")]
+    assert offered == [6, 6, 4, 4]
+    assert len(keys_of("six", BODIES["turtlebot3"])) == 4
 
 
 class TestServer:

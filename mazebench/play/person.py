@@ -12,6 +12,7 @@ from mazebench.agent import Agent, AgentConfig, Inputs, Observation
 from mazebench.constants import ACTIONS, DISCRETE, VELOCITIES
 from mazebench.errors import InputError
 from mazebench.options import Doc, ReadBy
+from mazebench.world.bodies import Body
 
 _LONGEST_NAME = 60  # characters
 # What a key changes: forward, left, turn.
@@ -66,6 +67,6 @@ class Person(Agent):
         return velocity[None] if self._kind == "velocity" else velocity[None, [0, 2]], state
 
 
-def keys_of(kind: str) -> tuple[str, ...]:
-    """Returns the keys with which actions of a kind are chosen: those of the six that it has."""
-    return DISCRETE["four" if kind == "diff" else kind if kind in DISCRETE else "six"]
+def keys_of(kind: str, body: Body) -> tuple[str, ...]:
+    """Returns the keys with which actions of a kind are chosen, and which move the body: six, or four of them."""
+    return DISCRETE["six" if kind in ("six", "velocity") and body.strafes else "four"]

@@ -40,7 +40,7 @@ class Scene:
             "phase": "drive",
             "title": title_of(options),
             "meaning": f"{track.help} Level {level}: {track.levels[level - 1].meaning}." if track else "",
-            "keys": keys_of(task.interface.actions),
+            "keys": keys_of(task.interface.actions, task.body),
             "limit": plan_route(task, episode, self._shown).time_limit * STEP_TIME,
             "reach": task.interface.lidar.max_range if task.interface.lidar else None,
             "radius": task.body.radius,
