@@ -22,6 +22,7 @@ from mazebench.commands.eval import evaluate
 from mazebench.commands.generate import generate
 from mazebench.commands.list import list_
 from mazebench.commands.merge import merge
+from mazebench.commands.play import play
 from mazebench.commands.prompt import prompt
 from mazebench.commands.render import render
 from mazebench.commands.report import report
@@ -45,6 +46,7 @@ app.command(short_help="Make mazes: MJCF, text, picture, mesh.")(generate)
 app.command("eval", short_help="Evaluate agents on unseen mazes.")(evaluate)
 app.command(short_help="Make one run of its shares.")(merge)
 app.command("check-map", short_help="Tell what an old map costs a robot, and where.")(check_map)
+app.command(short_help="Drive episodes yourself.")(play)
 app.command(short_help="Compare two agents on the same episodes.")(compare)
 app.command(short_help="Collect demonstrations of an agent.")(collect)
 app.command(short_help="Train an agent on the training mazes.")(train)

@@ -65,9 +65,10 @@ class Browser:
                 return answer["result"]
             self._note(answer)
 
-    def open(self, page: pathlib.Path, fragment: str = "") -> None:
-        """Loads a page from disk, anew if it was open, and waits until it has loaded."""
-        for address in ("about:blank", page.resolve().as_uri() + fragment):
+    def open(self, page: pathlib.Path | str, fragment: str = "") -> None:
+        """Loads a page, from disk or an address, anew if it was open, and waits until it has loaded."""
+        whole = page if isinstance(page, str) else page.resolve().as_uri()
+        for address in ("about:blank", whole + fragment):
             self.call("Page.navigate", url=address)
             while self._note(self._next_message()) != "Page.loadEventFired":
                 pass
@@ -88,8 +89,13 @@ class Browser:
 
     def press(self, key: str, code: int) -> None:
         """Presses and releases a key, as ("ArrowLeft", 37)."""
-        for kind in ("rawKeyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
+        for is_down in (True, False):
+            self.hold(key, code, is_down)
+
+    def hold(self, key: str, code: int, is_down: bool) -> None:
+        """Presses a key that stays down, or lets it go."""
+        kind = "rawKeyDown" if is_down else "keyUp"
+        self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
 
     def resize(self, width: int, height: int) -> None:
         """Makes the window another size."""

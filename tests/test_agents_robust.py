@@ -20,8 +20,8 @@ SHARES = strategies.sampled_from((0.0, 1.0)) | strategies.floats(0, 1, width=32)
 RANGES = strategies.sampled_from((0.0, 5.0)) | strategies.floats(0, 5, width=32)
 FLAGS = arrays.arrays(bool, (NUM_STEPS, NUM_SLOTS))
 
-# One asks somebody, one needs pictures, and one refuses maps that differ from the maze in more than doors.
-OTHERS = ("llm", "map-policy", "navigator-told")
+# Two ask somebody, one needs pictures, and one refuses maps that differ from the maze in more than doors.
+OTHERS = ("llm", "person", "map-policy", "navigator-told")
 CASES = [
     *((name, SIZE) for name in agent_names() if name not in OTHERS),
     *((name, 26) for name in ("planner", "planner-closed-loop", "navigator")),

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
 import functools
-import os
 import pathlib
 import traceback
 from typing import Annotated, Any
@@ -39,7 +37,8 @@ def evaluate(
             "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
             "tracks-camera and tracks-camera-dev, by camera alone; tracks-goals and tracks-goals-dev, three goals in "
             "a row where doors have moved; real and real-dev, real buildings with right, changed, old and no maps; "
-            "real-camera, by camera alone; llm and llm-dev, a few episodes, for agents whose answers cost."
+            "real-camera, by camera alone; llm and llm-dev, a few episodes, for agents whose answers cost; people-dev, "
+            "twelve episodes, for people."
         ),
     ] = None,
     out: Annotated[
@@ -74,18 +73,16 @@ def evaluate(
         raise InputError(f"{'--resume' if run.resume else '--shard'} needs --out, the folder of the run")
     load_mujoco(renders=False)
 
-    from mazebench.commands.summary_table import print_suite, print_summary
+    from mazebench.commands.summary_table import print_summaries
     from mazebench.evaluation.evaluate import run_evaluation
     from mazebench.evaluation.shards import end_shard, read_shard, shard_folder
     from mazebench.evaluation.suites import run_suite
-    from mazebench.results.reading import load_result, read_suite
 
     task = TaskOptions(**options_in(values, TaskOptions))
     options = EvalOptions(agent=agents[0], task=task, **options_in(values, EvalOptions))
     title = f"{agents[0]}, {task.task}" if suite is None else f"{suite}, {', '.join(agents)}"
     name = suite or f"{agents[0].replace(':', '-')}-{task.task}"
-    # The process tells runs apart that start at the same time.
-    folder = out or pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
+    folder = out or progress.new_folder(name)
     share = WHOLE
     if shard is not None:
         share = read_shard(shard)
@@ -94,14 +91,8 @@ def evaluate(
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")
     kept = progress.Kept()
-
-    def how_to_go_on() -> tuple[str, ...]:
-        if kept.of is None and not folder.exists():
-            return ("nothing was begun; run it again",)
-        return (f"{kept} in {folder}; go on", *(() if out else ("--out", str(folder))), "--resume")
-
     try:
-        with stopping.stoppable(how_to_go_on, waits=True):
+        with stopping.stoppable(lambda: kept.how_to_go_on(folder, out is not None), waits=True):
             with progress.evaluating(title, kept) as show:
                 summing = functools.partial(show, sums_up=True)
                 how: dict[str, Any] = {"shard": share, "is_dry": dry_run}
@@ -115,11 +106,8 @@ def evaluate(
                 return
             if shard is not None:
                 end_shard(folder, share)
-            elif suite is None:
-                print_summary(summaries[0])
             else:
-                folders = [folder / read_suite(folder).folders[each.agent] / str(each.part) for each in summaries]
-                print_suite([load_result(each) for each in folders])
+                print_summaries(summaries, folder)
     except AgentError as error:
         if show_traceback and error.__cause__ is not None:
             traceback.print_exception(error.__cause__)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import logging
+import os
+import pathlib
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -23,8 +25,19 @@ class Kept:
     ended: int = 0
     of: int | None = None  # None before the first is run
 
+    def how_to_go_on(self, folder: pathlib.Path, is_named: bool) -> tuple[str, ...]:
+        """Returns the words and options for `stopping.stoppable`; `is_named` says that --out names the folder."""
+        if self.of is None and not folder.exists():
+            return ("nothing was begun; run it again",)
+        return (f"{self} in {folder}; go on", *(() if is_named else ("--out", str(folder))), "--resume")
+
     def __str__(self) -> str:
         return "no episode has ended" if self.of is None else f"{self.ended:,} of {self.of:,} episodes are kept"
+
+
+def new_folder(name: str) -> pathlib.Path:
+    """Returns a folder in results/ for a run that begins now, which the process tells from others."""
+    return pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
 
 
 @contextmanager

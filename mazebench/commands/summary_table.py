@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +18,7 @@ from mazebench.results.comparison import Row
 from mazebench.results.metrics import HEADLINE, METRICS, Metric
 from mazebench.results.naming import noise_in_words, title_of
 from mazebench.results.paper import printed_mmn
-from mazebench.results.reading import Result
+from mazebench.results.reading import Result, load_result, read_suite
 from mazebench.results.records import Figures, Summary
 from mazebench.results.suite_groups import compare_maps, summarize_groups
 
@@ -27,6 +28,15 @@ _RECALL_NOTE = "pose: share of steps whose reported pose is within it, then that
 _NOTE = f"on time: within {' and '.join(f'{k:g}' for k in ON_TIME)} times the oracle's steps"
 
 Columns = Sequence[Sequence[Metric]]  # of a table; metrics of one column share its cells
+
+
+def print_summaries(summaries: Sequence[Summary], folder: pathlib.Path) -> None:
+    """Prints the summary of an evaluation, or those of a suite, that was run into a folder."""
+    if summaries[0].suite is None:
+        print_summary(summaries[0])
+    else:
+        folders = [folder / read_suite(folder).folders[each.agent] / str(each.part) for each in summaries]
+        print_suite([load_result(each) for each in folders])
 
 
 def print_summary(summary: Summary) -> None:

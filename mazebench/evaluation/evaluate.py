@@ -102,12 +102,14 @@ def run_evaluation(
     shard: Shard = WHOLE,
     summing: Progress = lambda ended, of: None,
     is_dry: bool = False,
+    pool: Pool | None = None,
 ) -> Summary | None:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
     `agent_class` is the class that `options.agent` names, and `task` has the options `options.task`, if they are there
     already. Of a `shard` without episodes, None is returned. `summing` is called as the oracle's drives end, which are
-    measured after the last episode. If `is_dry`, it says what the evaluation may cost and runs nothing.
+    measured after the last episode. If `is_dry`, it says what the evaluation may cost and runs nothing. `pool` runs
+    the episodes instead of the one that `run` asks for.
     """
     out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class, task=task)
@@ -121,7 +123,7 @@ def run_evaluation(
     say_cost([(plan, len(episodes))], is_dry)
     if is_dry:
         return None
-    with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
+    with pool_of(run, executor, pool) as pool, tempfile.TemporaryDirectory() as temporary:
         job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
         summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None

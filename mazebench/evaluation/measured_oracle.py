@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from mazebench import stopping
 from mazebench.agent_loading import load_agent_class
-from mazebench.evaluation.chunk import run_trials
+from mazebench.evaluation.chunk import Keep, Result, run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS
 from mazebench.evaluation.plan import Plan
 from mazebench.results.records import Record
@@ -61,12 +61,9 @@ def measure_steps_of_legs(
     progress: Callable[[int, int], None] = lambda ended, of: None,
 ) -> list[list[int | None]]:
     """Returns the oracle's steps to each goal of each trial, in one drive; None where it does not reach the goal."""
-    # The oracle has the six actions and observes nothing; tracks have the lidar all the same.
-    task = task.replace(actions="six", **WITHOUT_SENSORS)
-    agent = load_agent_class(_ORACLE).build(task.interface)
     steps: list[list[int | None]] = [[] for _ in trials]
     progress(0, len(steps))
-    for results in run_trials(agent, task, dict(enumerate(trials)), num_envs, needs_truth=True):
+    for results in oracle_drives(task, trials, num_envs):
         stopping.check()
         for result in results:
             is_measured = result.success and result.after_miss is None
@@ -74,3 +71,13 @@ def measure_steps_of_legs(
         if results:
             progress(sum(map(bool, steps)), len(steps))
     return steps
+
+
+def oracle_drives(
+    task: Task, trials: Sequence[Trial], num_envs: int = NUM_ENVS, keep: Keep | None = None
+) -> Iterator[list[Result]]:
+    """Yields the results of the oracle in some trials, as `run_trials` does."""
+    # The oracle has the six actions and observes nothing; tracks have the lidar all the same.
+    task = task.replace(actions="six", **WITHOUT_SENSORS)
+    agent = load_agent_class(_ORACLE).build(task.interface)
+    return run_trials(agent, task, dict(enumerate(trials)), num_envs, needs_truth=True, keep=keep)

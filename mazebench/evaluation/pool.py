@@ -18,7 +18,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, Self
 
 from mazebench import stopping
 from mazebench.agent import Agent
@@ -39,8 +39,10 @@ _CHUNKS_AHEAD = 2  # for each worker, of which it runs one: the next evaluation 
 
 
 @contextlib.contextmanager
-def pool_of(run: RunOptions, executor: concurrent.futures.Executor | None = None) -> Iterator[Pool]:
-    """Yields the pool that a run asks for: of its cluster, of an executor, or of its workers.
+def pool_of(
+    run: RunOptions, executor: concurrent.futures.Executor | None = None, own: Pool | None = None
+) -> Iterator[Pool]:
+    """Yields the pool `own`, or else that which a run asks for: of its cluster, of an executor, or of its workers.
 
     Raises:
       InputError: if the cluster can't be reached, or the number of an executor's workers is not given.
@@ -54,7 +56,7 @@ def pool_of(run: RunOptions, executor: concurrent.futures.Executor | None = None
             workers = workers or cluster.num_cores
         if executor is not None and not workers:
             raise InputError("expected workers with an executor, the number of chunks that it runs at once, found 0")
-        yield stack.enter_context(Pool(workers, executor))
+        yield stack.enter_context(own or Pool(workers, executor))
 
 
 class Pool:
@@ -173,7 +175,7 @@ class Pool:
             )
         return RunError("a worker process ended abruptly; what ended is kept, go on with --resume")
 
-    def __enter__(self) -> Pool:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: object, *exception: object) -> None:

@@ -16,7 +16,7 @@ from mazebench.errors import InputError, RunError, UnplayableError, remark, unkn
 from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard
 from mazebench.evaluation.evaluate import Job, Progress, run_jobs, say_cost
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
-from mazebench.evaluation.pool import pool_of
+from mazebench.evaluation.pool import Pool, pool_of
 from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import DEV, SIZES, manifest_hash
 from mazebench.maps.real_buildings import PREFIX, RIGHT, Building, buildings, is_real
@@ -64,6 +64,19 @@ def _in_words(split: str = "eval") -> tuple[Part, ...]:
     return tuple(
         Part(f"{track}-{level}-words", TaskOptions(task=track, level=(level,), split=split), episodes_per_maze=1)
         for track, level in ((BUILDING, 1), (REBUILT, 2), (ADRIFT, 1), (ADRIFT, 2))
+    )
+
+
+def _for_people() -> tuple[Part, ...]:
+    """Returns parts of four episodes each, in other mazes each, which get harder: some minutes in all."""
+    chosen = (BUILDING, 1, (18,)), (REBUILT, 2, (27,)), (ADRIFT, 1, (34, 39))
+    return tuple(
+        Part(
+            f"{track}-{level}-people",
+            TaskOptions(task=track, level=(level,), split=DEV, distances=distances),
+            episodes_per_maze=1,
+        )
+        for track, level, distances in chosen
     )
 
 
@@ -150,7 +163,15 @@ SUITES: dict[str, tuple[Part, ...]] = {
     "real-camera": _by_camera_in_real_buildings("eval"),
     "llm": _in_words(),
     "llm-dev": _in_words(split=DEV),
+    "people-dev": _for_people(),
 }
+
+
+def parts_of(suite: str) -> tuple[Part, ...]:
+    """Returns the parts of the suite with a name; raises `InputError` if there is none."""
+    if suite not in SUITES:
+        raise unknown("suite", suite, SUITES)
+    return SUITES[suite]
 
 
 def run_suite(
@@ -169,6 +190,7 @@ def run_suite(
     own_parts: Sequence[Part] | None = None,
     body: Any = SLIDER.name,
     is_dry: bool = False,
+    pool: Pool | None = None,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
@@ -189,6 +211,7 @@ def run_suite(
       own_parts: the parts, instead of those in `SUITES`.
       body: what is driven, as the option of `TaskOptions` has it.
       is_dry: whether to say what the suite may cost and to run nothing.
+      pool: runs the episodes, instead of the one that `run` asks for.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint or values given to several agents, or the
@@ -196,12 +219,10 @@ def run_suite(
       UnplayableError: if an agent can play no part.
       RunError: if an agent or a worker failed; what ended until then is kept.
     """
-    if own_parts is None and suite not in SUITES:
-        raise unknown("suite", suite, SUITES)
     out = out.absolute()  # agents may change the working folder
     if (checkpoint is not None or overrides) and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint or --set, found {len(agents)}")
-    driven = own_parts or [dataclasses.replace(part, task=part.task.replace(body=body)) for part in SUITES[suite]]
+    driven = own_parts or [dataclasses.replace(part, task=part.task.replace(body=body)) for part in parts_of(suite)]
     parts = {part.name: part for part in driven}
 
     def planned(agent: str, part: Part) -> Plan:
@@ -252,7 +273,7 @@ def run_suite(
                 record = not is_finished(folder) if run.record is None else run.record
                 yield Job(plan, folder, record, episodes[key], suite, key[1])
 
-    with pool_of(run, executor) as pool:
+    with pool_of(run, executor, pool) as pool:
         make_folder(out)
         _prepare(
             out, suite, tuple(parts), agents, seed, {key: plans[key] for key in chosen if key in plans}, run.resume
