@@ -6,6 +6,7 @@ python -m mazebench_agents.robot.bend_training --out map-bends.safetensors
 from __future__ import annotations
 
 import argparse
+import contextlib
 import pathlib
 import time
 from collections.abc import Iterator, Mapping
@@ -15,11 +16,13 @@ import numpy as np
 import torch
 from scipy import ndimage
 
+from mazebench.errors import InputError
+from mazebench.maps.drawn import FreshMazes
+from mazebench.maps.kinds import KNOWN
 from mazebench.maps.maze import Maze
 from mazebench.tasks.perturbations.hand_drawing import HandDrawing, HandDrawnMap, Line
 from mazebench.tasks.perturbations.moved_doors import MovedDoors
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.task import Task
 
 from ..common.actor import one_torch_thread
 from ..common.checkpoint import load_checkpoint, save_checkpoint
@@ -35,7 +38,6 @@ _NUM_KEPT = 2048  # drawings that batches are taken from
 _SAME_MAZE = 3  # drawings of a maze, each with other doors
 _BENDS = (0.5, 1.0, 1.5, 1.5)  # m, as likely as each other
 _MOVED = (MovedDoors(45), MovedDoors(70))
-_KINDS = ("dfs", "house", "rooms")
 _OUTSIDE = 4  # m around the maze in which points that are drawn are looked for
 _PER_CELL = 4  # points at which the displacement is computed, along an axis
 _NUM_TURNS = 24  # of the search for the point that is drawn at a place
@@ -51,11 +53,11 @@ class Drawn(NamedTuple):
 
 
 class Drawings:
-    """A stream of drawings of the train kinds, with doors moved or not."""
+    """A stream of drawings of mazes of some kinds, with doors moved or not."""
 
-    def __init__(self, seed: int, begin: int = 0):
-        """Draws from a seed of two numbers."""
-        self._mazes = Task.of("building", split="train", fresh=True, kinds=_KINDS).mazes
+    def __init__(self, seed: int, begin: int = 0, kinds: tuple[str, ...] = KNOWN):
+        """Draws from a seed of two numbers; each maze is a new one."""
+        self._mazes = FreshMazes(kinds, SIZE)
         self._rng = np.random.default_rng([seed, begin, 2])
         self._maze: Maze = self._mazes[0]
         self._num_drawn = 0
@@ -67,7 +69,8 @@ class Drawings:
             self._maze = self._mazes[int(rng.integers(len(self._mazes)))]
         shown = ShownMap(self._maze.walls, kind=self._maze.kind)
         if self._num_drawn % _SAME_MAZE:
-            shown = _MOVED[rng.integers(len(_MOVED))].shown(shown, (), rng)
+            with contextlib.suppress(InputError):  # of a maze with few doors
+                shown = _MOVED[rng.integers(len(_MOVED))].shown(shown, (), rng)
         self._num_drawn += 1
         bend = rng.choice(_BENDS) if bend is None else bend
         shown = HandDrawnMap(bend).shown(shown, (), rng)

@@ -28,14 +28,14 @@ from scipy import special
 from mazebench.maps.maze import Cell
 
 from .drawing import compare, widths_of_pixels
-from .gauss_newton import normal_equations, variances
+from .gauss_newton import inverse, normal_equations, variances
 
 GUESSED_SIZE = 31  # cells of 1 m on a side of the mazes for whose drawings a network ships that guesses their bends
 
 _SMOOTHNESS = 4.2  # cells, deviation of the Gaussian by which displacements of two points are correlated
 _DISPLACEMENT = 0.6  # cells, deviation
-_NUM_MODES, _NUM_MODES_GUESSED = 24, 48  # without and with a guess: 0.89 and 0.99 of the field's variance
-_MODES_PER_AXIS = {_NUM_MODES: 9, _NUM_MODES_GUESSED: 11}
+_NUM_MODES, _NUM_MODES_GUESSED = 24, 64  # without and with a guess
+_MODES_PER_AXIS = {_NUM_MODES: 9, _NUM_MODES_GUESSED: 13}
 _AFFINE = 1.0  # cells, deviation of what is off at first in the middle, and at the edges for the wrong scale
 _THICKENING = 0.3  # cells, deviation
 _LARGEST_THICKENING = 0.6  # cells
@@ -44,6 +44,7 @@ _WALL = 0.4  # prior probability of a wall
 _LARGEST_LOG_ODDS = 30.0
 _DAMPING = 0.5  # share of the new log odds in an update; all at once, neighbours would go back and forth
 
+_ROWS = 64  # of a product of up to 140 columns
 _LARGEST_STEP = 0.5  # cells that a point is moved at once
 _WIDTHS = (0.2, 3.0)  # cells, the smallest and the largest side of a box
 _NODES = 4  # per cell, at which modes are computed
@@ -71,14 +72,9 @@ def _schedule(first: float, last: float, num_steps: int, blur: float) -> list[tu
 _RIGID_STEPS = 3  # before walls are estimated
 # Tried in turn until a registration is right; the first is the fastest.
 _SCHEDULES = (_schedule(0.8, 0.2, 12, 2.0), _schedule(0.8, 0.2, 24, 2.5), _schedule(0.5, 0.25, 24, 1.5))
-# From a guess, with the share of it in the prior.
-_SCHEDULES_GUESSED = (
-    (_schedule(0.5, 0.2, 10, 1.5), 0.3),
-    (_schedule(0.3, 0.2, 8, 1.0), 1.0),
-    (_schedule(0.8, 0.2, 16, 2.0), 0.1),
-)
+_SCHEDULE_GUESSED = _schedule(0.3, 0.2, 8, 1.0)
 _LEAST_VARIANCE = 0.02  # of a guess, cells squared
-_ALIKE = 12.0  # places of a guess whose errors are about the same
+_ALIKE = 5.0  # places of a guess whose errors are about the same
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,12 +136,13 @@ class Guess(NamedTuple):
 def register(picture: np.ndarray, size: int, guess: Guess | None = None) -> Registration:
     """Returns the registration of `picture`, `[M, M]` shares of wall, with a maze of `size` cells a side."""
     picture = picture.astype(np.float64)
+    if guess is not None:
+        fit = _Fit(picture, size, _NUM_MODES_GUESSED)
+        fit.begin_at(guess)
+        return fit.run(_SCHEDULE_GUESSED)
     found: list[Registration] = []
-    for schedule, share in [(each, 0.0) for each in _SCHEDULES] if guess is None else _SCHEDULES_GUESSED:
-        fit = _Fit(picture, size, _NUM_MODES if guess is None else _NUM_MODES_GUESSED)
-        if guess is not None:
-            fit.begin_at(guess, share)
-        found.append(fit.run(schedule))
+    for schedule in _SCHEDULES:
+        found.append(_Fit(picture, size, _NUM_MODES).run(schedule))
         if found[-1].residual < _SHARP:
             break
     return min(found, key=lambda registration: registration.residual)
@@ -177,20 +174,19 @@ class _Fit:
         precision[-1] = 1 / _THICKENING**2
         self.precision, self.mean = np.diag(precision), np.zeros(len(precision))  # of the prior
         self.parameters = self.mean
-        self.covariance = np.diag(1 / precision)
+        self.covariance, self.inverse = np.diag(1 / precision), np.linalg.inv
 
-    def begin_at(self, guess: Guess, share: float) -> None:
-        """Begins at a guess, which takes a share of the prior, too."""
-        basis, guessed = _basis(guess.places, guess.places, self.size, self.num_modes), self.precision.copy()
-        count, mean = basis.shape[-1], np.zeros(len(self.mean))
-        for axis, (bends, scales) in enumerate(zip(guess.bends, guess.scales, strict=True)):
-            own = slice(axis * count, (axis + 1) * count)
-            weighted = basis[axis].T / (_ALIKE * (2 * scales.ravel() ** 2 + _LEAST_VARIANCE))
-            guessed[own, own] += weighted @ basis[axis]
-            mean[own] = np.linalg.solve(guessed[own, own], weighted @ bends.ravel())
-        self.covariance = np.linalg.inv(guessed)
-        self.precision = (1 - share) * self.precision + share * guessed
-        self.parameters = self.mean = mean
+    def begin_at(self, guess: Guess) -> None:
+        """Begins at a guess, which is the prior from now on."""
+        basis = _basis(guess.places, guess.places, self.size, self.num_modes)
+        deviations, gradient = np.sqrt(_ALIKE * (2 * guess.scales**2 + _LEAST_VARIANCE)), np.zeros(len(self.mean))
+        for axis, along in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))):
+            slopes = np.broadcast_to(along, (*guess.bends[axis].shape, 3))
+            sums = normal_equations(basis, slopes.copy(), guess.bends[axis], deviations[axis])
+            self.precision, gradient = self.precision + sums[0], gradient + sums[1]
+        self.inverse = inverse  # LAPACK would start threads for so many parameters
+        self.covariance = inverse(self.precision)
+        self.parameters = self.mean = _product(self.covariance, gradient)
 
     def run(self, schedule: list[tuple[float, float]]) -> Registration:
         """Returns the registration after all steps of a schedule."""
@@ -241,13 +237,18 @@ class _Fit:
         # Parameters by Gauss-Newton.
         hessian, gradient = normal_equations(self.basis, slopes, differences, deviations)
         hessian += self.precision
-        gradient -= self.precision @ (self.parameters - self.mean)
-        self.covariance = np.linalg.inv(hessian)
-        step = self.covariance @ gradient
+        gradient -= _product(self.precision, self.parameters - self.mean)
+        self.covariance = self.inverse(hessian)
+        step = _product(self.covariance, gradient)
         largest = np.abs(self._shifts(step)).max()
         self.parameters = self.parameters + step * min(1.0, _LARGEST_STEP / max(largest, 1e-9))
         self.parameters[-1] = np.clip(self.parameters[-1], -_LARGEST_THICKENING, _LARGEST_THICKENING)
         return differences
+
+
+def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Returns `[D]`: a matrix `[D, D]` times a vector, a few rows at a time; for more, BLAS would start threads."""
+    return np.concatenate([matrix[row : row + _ROWS] @ vector for row in range(0, len(matrix), _ROWS)])
 
 
 def drawing_box(picture: np.ndarray) -> list[np.ndarray]:
