@@ -18,6 +18,7 @@ from mazebench_agents.robot.map_reading import BENDS, map_reader, read_map
 
 import mazebench
 from mazebench.errors import InputError, Remark
+from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.tasks.context import build_context
 from mazebench.tasks.task import Task
 
@@ -86,6 +87,12 @@ class TestShippedNetwork:
         )
         assert now < 0.06
         assert before > 2 * now
+
+    @pytest.mark.parametrize("kind", [*KNOWN, *NOVEL])
+    def test_maps_that_are_not_bent_are_read_right(self, network, kind):
+        walls = generate(kind, SIZE, np.random.default_rng(0)).walls
+        picture = np.kron(walls, np.ones((2, 2))).astype(np.float32)
+        np.testing.assert_array_equal(register(picture, SIZE, network.read(picture)).walls > 0.5, walls)
 
     def test_a_sheet_without_a_maze_gives_distributions(self, network):
         for value in (0.4, 1.0):

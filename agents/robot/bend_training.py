@@ -149,21 +149,9 @@ class Training:
                 yield update, float(np.mean(losses[-_REPORTED:]))
 
 
-def errors(network: BendNetwork, bend: float, count: int = 48) -> str:
-    """Returns the mean error of the network, and of no network, in fresh drawings."""
-    drawings = Drawings(seed=2**32 - 1)
-    drawn = [drawings.draw(bend) for _ in range(count)]
-    true = np.array(list(map(true_bends, drawn)))
-    off = np.abs(np.array([network.read(each.picture).bends for each in drawn]) - true)
-    return (
-        f"bend {bend:g} m: off by {off.mean():.3f} cells along an axis ({np.abs(true).mean():.3f} if nothing is read), "
-        f"by over .5 in {np.mean(off > 0.5):.1%}"
-    )
-
-
 @one_torch_thread()
 def main() -> None:
-    """Trains, and writes the network every minute or so; says its errors."""
+    """Trains, and writes the network every minute or so."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--updates", type=int, default=9_000, help=f"of {_BATCH} drawings each")
     parser.add_argument("--seed", type=int, default=0)
@@ -178,8 +166,6 @@ def main() -> None:
         save_checkpoint(options.out, training.network.state_dict(), provenance)
         save_checkpoint(state, training.tensors(), provenance)
         print(f"{update:,} updates, {time.process_time():.0f} s of CPU, loss {loss:.3f}", flush=True)
-        if update % (5 * _REPORTED) == 0 or update == options.updates:
-            print(*(errors(training.network, bend) for bend in (0.5, 1.0, 1.5)), sep="\n", flush=True)
 
 
 if __name__ == "__main__":
