@@ -3,17 +3,23 @@
   layouts   of 100 mazes of each kind: the longest of the shortest paths, and doors (docs/layouts.md)
   doors     how often moved doors block the shortest path on the map, and make a robot late (docs/tracks.md)
   ranges    the errors of ranges that are read from pictures of the camera of 75 degrees (docs/sensors.md)
+  bends     cells of drawn maps that are misread, with and without the network that reads bends (docs/baselines.md)
 
-Mazes of `layouts` and `doors` are drawn from a seed of this script: none is a maze of a split.
+Mazes of `layouts`, `doors` and `bends` are drawn from a seed of this script: none is a maze of a split.
 """
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Iterator
 
 import numpy as np
+from mazebench_agents.robot.bend_network import load
+from mazebench_agents.robot.bend_training import Drawings, true_bends
 from mazebench_agents.robot.camera_ranges import CameraRanges
+from mazebench_agents.robot.drawn_map import register
+from mazebench_agents.robot.map_reading import BENDS
 from mazebench_agents.robot.range_training import errors
 
 from benchmarks.results.results_tables import format_table
@@ -91,8 +97,24 @@ def ranges() -> str:
     return "".join(f"{row}\n" for row in errors(network, 75, VARIED))
 
 
+def bends(count: int = 60) -> str:
+    """Returns errors in `count` drawings of known and of held-out layouts at each bend."""
+    network, rows = load(BENDS), []
+    for (text, kinds), bend in itertools.product({"known": KNOWN, "held-out": NOVEL}.items(), (0.5, 1.0, 1.5)):
+        drawings, found = Drawings(_SEED, kinds=kinds), []
+        for drawn in (drawings.draw(bend) for _ in range(count)):
+            true, guess = true_bends(drawn), network.read(drawn.picture)
+            registered = [register(drawn.picture, KINDS_SIZE, given) for given in (None, guess)]
+            misread = [((each.walls > 0.5) != drawn.walls)[1:-1, 1:-1].mean() for each in registered]
+            found.append([np.abs(true).mean(), np.abs(guess.bends - true).mean(), *misread])
+        off, left, before, now = np.mean(found, axis=0)
+        rows.append([text, f"{bend:g} m", f"{off:.2f}", f"{left:.2f}", f"{before:.1%}", f"{now:.1%}"])
+    header = ["layouts", "bend", "mean displacement, cells", "error of the network", "misread without it", "with it"]
+    return format_table(header, rows)
+
+
 if __name__ == "__main__":
-    measures = {make.__name__: make for make in (layouts, doors, ranges)}
+    measures = {make.__name__: make for make in (layouts, doors, ranges, bends)}
     if len(sys.argv) != 2 or sys.argv[1] not in measures:
         sys.exit(__doc__)
     print(measures[sys.argv[1]](), end="")

@@ -127,6 +127,14 @@ class _Declarations:
         return sensors
 
     @classmethod
+    def map_reader(cls, interface: Interface) -> pathlib.Path | None:
+        """Returns the file of a network of its own by which it reads the maps of such environments; None without one.
+
+        Results have the file's hash.
+        """
+        return None
+
+    @classmethod
     def default_checkpoint(cls) -> pathlib.Path | None:
         """Returns the file that `build` reads if it is given none; None if the agent reads no checkpoint."""
         return None
@@ -264,7 +272,7 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
         return declared
     # Named as the class that it wraps, for messages and provenance.
     declarations = ("eval_config", "needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
-    methods = ("context_size", "read_sensors", "default_checkpoint")
+    methods = ("context_size", "read_sensors", "map_reader", "default_checkpoint")
     names = ("__module__", "__qualname__", "__doc__", *declarations, *methods)
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

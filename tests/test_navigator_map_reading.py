@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mazebench_agents.robot.drawing import compare, widths_of_pixels
-from mazebench_agents.robot.gauss_newton import normal_equations, variances
+from mazebench_agents.robot.gauss_newton import inverse, normal_equations, variances
 from mazebench_agents.robot.map_reading import read_map
 
 from mazebench.maps.kinds import generate
@@ -144,6 +144,11 @@ class TestGaussNewton:
         hessian, gradient = normal_equations(basis, slopes, differences, deviations)
         np.testing.assert_allclose(hessian, jacobian.T @ jacobian, atol=1e-12)
         np.testing.assert_allclose(gradient, jacobian.T @ (differences / deviations).ravel(), atol=1e-12)
+
+    def test_inverse_is_that_of_lapack(self):
+        factor = np.random.default_rng(0).normal(size=(40, 60))
+        matrix = factor @ factor.T
+        np.testing.assert_allclose(inverse(matrix), np.linalg.inv(matrix), rtol=1e-8, atol=1e-10)
 
     def test_variances_are_those_of_drawn_parameters(self):
         rng = np.random.default_rng(0)

@@ -12,6 +12,7 @@ from mazebench.agent import Agent, Inputs, Interface, Report
 
 from ..robot.driving import Drive
 from ..robot.facing import TurningDrive
+from ..robot.map_reading import map_reader
 from ..robot.moving_body import PLAYED, as_kind, has_all_six
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses, range_sensor, report
@@ -37,6 +38,7 @@ class Navigator(Agent):
     plays_actions = PLAYED
     senses_class: ClassVar[type[Senses]] = Senses
     read_sensors = staticmethod(range_sensor)
+    map_reader = staticmethod(map_reader)
     waits: ClassVar[bool] = True  # for passages to open, once it has seen one change
 
     def __init__(self, interface: Interface):

@@ -22,6 +22,7 @@ from ..common.actor import acting
 from ..common.layers import in_batches
 from ..common.rollouts import RolloutLearner, Rows
 from ..imitation import ImitatingAgent, ImitationLearner
+from ..robot.map_reading import map_reader
 from ..robot.motion import Motion, moved_in_the_open
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses, range_sensor, report
@@ -63,6 +64,7 @@ class NeuralPlanner(ImitatingAgent):
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
     learns_several_tasks = True
     read_sensors = staticmethod(range_sensor)
+    map_reader = staticmethod(map_reader)
     config: NeuralPlannerConfig
     network: PlannerNetwork
     _senses: Senses

@@ -9,6 +9,8 @@ The point of the maze at a pixel is affine in the pixel plus a Gaussian random f
 - A Gauss-Newton step moves the points and changes the thickness (Lucas and Kanade 1981; Amit et al. 1991 for the prior
   of modes).
 
+A guess of how far points are displaced, such as a network's, may be the start and the prior instead of no displacement.
+
 Points are (row, column) in cells, with the maze's corners at 0 and N. `P` x `Q` are the pixels around the drawing, `D`
 the parameters of an axis.
 """
@@ -18,6 +20,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -25,11 +28,14 @@ from scipy import special
 from mazebench.maps.maze import Cell
 
 from .drawing import compare, widths_of_pixels
-from .gauss_newton import normal_equations, variances
+from .gauss_newton import inverse, normal_equations, variances
+
+GUESSED_SIZE = 31  # cells of 1 m on a side of the mazes for whose drawings a network ships that guesses their bends
 
 _SMOOTHNESS = 4.2  # cells, deviation of the Gaussian by which displacements of two points are correlated
 _DISPLACEMENT = 0.6  # cells, deviation
-_NUM_MODES = 24
+_NUM_MODES, _NUM_MODES_GUESSED = 24, 64  # without and with a guess
+_MODES_PER_AXIS = {_NUM_MODES: 9, _NUM_MODES_GUESSED: 13}
 _AFFINE = 1.0  # cells, deviation of what is off at first in the middle, and at the edges for the wrong scale
 _THICKENING = 0.3  # cells, deviation
 _LARGEST_THICKENING = 0.6  # cells
@@ -38,10 +44,10 @@ _WALL = 0.4  # prior probability of a wall
 _LARGEST_LOG_ODDS = 30.0
 _DAMPING = 0.5  # share of the new log odds in an update; all at once, neighbours would go back and forth
 
+_ROWS = 64  # of a product of up to 140 columns
 _LARGEST_STEP = 0.5  # cells that a point is moved at once
 _WIDTHS = (0.2, 3.0)  # cells, the smallest and the largest side of a box
 _NODES = 4  # per cell, at which modes are computed
-_MODES_PER_AXIS = 9
 
 _SHARP = 0.05  # root mean square difference of picture and expectation, below which a registration is right
 _ERROR = 0.002  # probability that a cell is misread where the registration is right
@@ -66,6 +72,9 @@ def _schedule(first: float, last: float, num_steps: int, blur: float) -> list[tu
 _RIGID_STEPS = 3  # before walls are estimated
 # Tried in turn until a registration is right; the first is the fastest.
 _SCHEDULES = (_schedule(0.8, 0.2, 12, 2.0), _schedule(0.8, 0.2, 24, 2.5), _schedule(0.5, 0.25, 24, 1.5))
+_SCHEDULE_GUESSED = _schedule(0.3, 0.2, 8, 1.0)
+_LEAST_VARIANCE = 0.02  # of a guess, cells squared
+_ALIKE = 5.0  # places of a guess whose errors are about the same
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,12 +122,27 @@ class Registration:
         return marked.reshape(size, size)
 
 
-def register(picture: np.ndarray, size: int) -> Registration:
+class Guess(NamedTuple):
+    """By how much points may be displaced, before a picture is registered. `T` is the number of places along an axis.
+
+    A place is where a point is drawn if nothing is displaced, in cells.
+    """
+
+    places: np.ndarray  # [T] float
+    bends: np.ndarray  # [2, T, T] float, along rows and along columns, in cells
+    scales: np.ndarray  # [2, T, T] float, of Laplace's distribution of their errors, in cells
+
+
+def register(picture: np.ndarray, size: int, guess: Guess | None = None) -> Registration:
     """Returns the registration of `picture`, `[M, M]` shares of wall, with a maze of `size` cells a side."""
     picture = picture.astype(np.float64)
+    if guess is not None:
+        fit = _Fit(picture, size, _NUM_MODES_GUESSED)
+        fit.begin_at(guess)
+        return fit.run(_SCHEDULE_GUESSED)
     found: list[Registration] = []
     for schedule in _SCHEDULES:
-        found.append(_Fit(picture, size).run(schedule))
+        found.append(_Fit(picture, size, _NUM_MODES).run(schedule))
         if found[-1].residual < _SHARP:
             break
     return min(found, key=lambda registration: registration.residual)
@@ -127,17 +151,15 @@ def register(picture: np.ndarray, size: int) -> Registration:
 class _Fit:
     """A registration under way."""
 
-    def __init__(self, picture: np.ndarray, size: int):
+    def __init__(self, picture: np.ndarray, size: int, num_modes: int):
         """Lays the maze's inner cells on the box around what is free in the picture."""
         # Log odds of walls, by the prior and now.
         self.prior = np.minimum(special.logit(with_border(np.full((size, size), _WALL))), _LARGEST_LOG_ODDS)  # [N, N]
         self.log_odds = self.prior  # [N, N]
 
         # The box around what is free, and two pixels more.
-        free = picture < max(0.5, picture.min() + 0.1)
-        extents = [np.flatnonzero(free.any(axis=1 - axis))[[0, -1]] for axis in (0, 1)]
         crops, coordinates = [], []
-        for (first, last), length in zip(extents, picture.shape, strict=True):
+        for (first, last), length in zip(drawing_box(picture), picture.shape, strict=True):
             crop = np.arange(max(first - 2, 0), min(last + 3, length))
             crops.append(crop)
             coordinates.append(1 + (crop + 0.5 - first) * (size - 2) / (last + 1 - first))
@@ -146,11 +168,25 @@ class _Fit:
         self.nominal = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1)  # [P, Q, 2], at parameters of 0
 
         # Parameters: of rows, of columns, thickening.
-        self.basis = _basis(coordinates[0], coordinates[1], size)
-        self.precision = np.ones(2 * self.basis.shape[-1] + 1)  # [2 D + 1], by the prior
-        self.precision[-1] = 1 / _THICKENING**2
-        self.parameters = np.zeros(len(self.precision))
-        self.covariance = np.diag(1 / self.precision)
+        self.size, self.num_modes = size, num_modes
+        self.basis = _basis(coordinates[0], coordinates[1], size, num_modes)
+        precision = np.ones(2 * self.basis.shape[-1] + 1)
+        precision[-1] = 1 / _THICKENING**2
+        self.precision, self.mean = np.diag(precision), np.zeros(len(precision))  # of the prior
+        self.parameters = self.mean
+        self.covariance, self.inverse = np.diag(1 / precision), np.linalg.inv
+
+    def begin_at(self, guess: Guess) -> None:
+        """Begins at a guess, which is the prior from now on."""
+        basis = _basis(guess.places, guess.places, self.size, self.num_modes)
+        deviations, gradient = np.sqrt(_ALIKE * (2 * guess.scales**2 + _LEAST_VARIANCE)), np.zeros(len(self.mean))
+        for axis, along in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))):
+            slopes = np.broadcast_to(along, (*guess.bends[axis].shape, 3))
+            sums = normal_equations(basis, slopes.copy(), guess.bends[axis], deviations[axis])
+            self.precision, gradient = self.precision + sums[0], gradient + sums[1]
+        self.inverse = inverse  # LAPACK would start threads for so many parameters
+        self.covariance = inverse(self.precision)
+        self.parameters = self.mean = _product(self.covariance, gradient)
 
     def run(self, schedule: list[tuple[float, float]]) -> Registration:
         """Returns the registration after all steps of a schedule."""
@@ -200,14 +236,25 @@ class _Fit:
 
         # Parameters by Gauss-Newton.
         hessian, gradient = normal_equations(self.basis, slopes, differences, deviations)
-        hessian += np.diag(self.precision)
-        gradient -= self.precision * self.parameters
-        self.covariance = np.linalg.inv(hessian)
-        step = self.covariance @ gradient
+        hessian += self.precision
+        gradient -= _product(self.precision, self.parameters - self.mean)
+        self.covariance = self.inverse(hessian)
+        step = _product(self.covariance, gradient)
         largest = np.abs(self._shifts(step)).max()
         self.parameters = self.parameters + step * min(1.0, _LARGEST_STEP / max(largest, 1e-9))
         self.parameters[-1] = np.clip(self.parameters[-1], -_LARGEST_THICKENING, _LARGEST_THICKENING)
         return differences
+
+
+def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Returns `[D]`: a matrix `[D, D]` times a vector, a few rows at a time; for more, BLAS would start threads."""
+    return np.concatenate([matrix[row : row + _ROWS] @ vector for row in range(0, len(matrix), _ROWS)])
+
+
+def drawing_box(picture: np.ndarray) -> list[np.ndarray]:
+    """Returns the first and the last pixel, `[2]` int, in which `picture` is free, along rows and along columns."""
+    free = picture < max(0.5, picture.min() + 0.1)
+    return [np.flatnonzero(free.any(axis=1 - axis))[[0, -1]] for axis in (0, 1)]
 
 
 def with_border(walls: np.ndarray) -> np.ndarray:
@@ -216,45 +263,46 @@ def with_border(walls: np.ndarray) -> np.ndarray:
     return walls
 
 
-def _basis(rows: np.ndarray, columns: np.ndarray, size: int) -> np.ndarray:
+def _basis(rows: np.ndarray, columns: np.ndarray, size: int, num_modes: int) -> np.ndarray:
     """Returns `[2, P Q, D]`: by how much each parameter moves the points at `rows` `[P]` x `columns` `[Q]`, in cells.
 
     The first two parameters of an axis are a shift and a scale, the others weigh the modes of the field.
     """
-    along_rows, along_columns = _modes_at(rows, size), _modes_at(columns, size)
-    *_, first, second = _modes(size)
+    along_rows, along_columns = (_modes_at(each, size, num_modes) for each in (rows, columns))
+    *_, first, second = _modes(size, num_modes)
     modes = along_rows[:, None, first] * along_columns[None, :, second]
-    basis = np.empty((2, len(rows) * len(columns), 2 + _NUM_MODES))
+    basis = np.empty((2, len(rows) * len(columns), 2 + num_modes))
     basis[:, :, 0] = _AFFINE
     basis[0, :, 1] = _AFFINE * np.repeat(2 * rows / size - 1, len(columns))
     basis[1, :, 1] = _AFFINE * np.tile(2 * columns / size - 1, len(rows))
-    basis[:, :, 2:] = _DISPLACEMENT * modes.reshape(-1, _NUM_MODES)
+    basis[:, :, 2:] = _DISPLACEMENT * modes.reshape(-1, num_modes)
     return basis
 
 
-def _modes_at(coordinates: np.ndarray, size: int) -> np.ndarray:
-    """Returns `[T, 9]`: the modes of a Gaussian process on [0, N], times their deviations, at `coordinates` `[T]`.
+def _modes_at(coordinates: np.ndarray, size: int, num_modes: int) -> np.ndarray:
+    """Returns `[T, A]`: the modes of a Gaussian process on [0, N], times their deviations, at `coordinates` `[T]`.
 
     By the method of Nystroem from the modes at nodes; constant from 1.5 cells outside on.
     """
-    nodes, weights, _, _ = _modes(size)
+    nodes, weights, _, _ = _modes(size, num_modes)
     return _correlation(np.clip(coordinates, -1.5, size + 1.5), nodes) @ weights
 
 
 @functools.lru_cache
-def _modes(size: int) -> tuple[np.ndarray, ...]:
-    """Returns nodes `[T]` on [0, N], and the modes' weights at them `[T, 9]`.
+def _modes(size: int, num_modes: int) -> tuple[np.ndarray, ...]:
+    """Returns nodes `[T]` on [0, N], and the weights at them of `A` modes of an axis, `[T, A]`.
 
-    Then follow the modes along rows and along columns whose products have the largest variances, `[24]` each.
+    Then follow the modes along rows and along columns whose products have the largest variances, `[num_modes]` each.
     """
+    num_per_axis = _MODES_PER_AXIS[num_modes]
     nodes = np.linspace(0, size, _NODES * size + 1)
     lengths = np.full(len(nodes), 1 / _NODES)
     lengths[[0, -1]] /= 2
     root = np.sqrt(lengths)
     variances, vectors = np.linalg.eigh(root[:, None] * _correlation(nodes, nodes) * root)
-    variances, vectors = variances[::-1][:_MODES_PER_AXIS], vectors[:, ::-1][:, :_MODES_PER_AXIS]
+    variances, vectors = variances[::-1][:num_per_axis], vectors[:, ::-1][:, :num_per_axis]
     products = np.outer(variances, variances)
-    main = np.unravel_index(np.argsort(-products, axis=None)[:_NUM_MODES], products.shape)
+    main = np.unravel_index(np.argsort(-products, axis=None)[:num_modes], products.shape)
     return nodes, root[:, None] * vectors / np.sqrt(variances), *main
 
 

@@ -48,6 +48,24 @@ def normal_equations(
 
 
 @compiled
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    """Returns the inverse of `matrix`, `[D, D]` float, symmetric and positive definite, by Gauss-Jordan elimination."""
+    result = matrix.copy()
+    for pivot in range(len(result)):
+        scale = 1.0 / result[pivot, pivot]
+        result[pivot, pivot] = 1.0
+        for column in range(len(result)):
+            result[pivot, column] *= scale
+        for row in range(len(result)):
+            if row != pivot:
+                factor = result[row, pivot]
+                result[row, pivot] = 0.0
+                for column in range(len(result)):
+                    result[row, column] -= factor * result[pivot, column]
+    return result
+
+
+@compiled
 def variances(basis: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Returns `[P Q, 2]` float: the variances of the points along both axes.
 

@@ -23,7 +23,7 @@ from .cells import marked_cell, nearest_cell
 from .contacts import felt_walls
 from .dead_reckoning import DeadReckoning
 from .map_matching import MapBelief
-from .map_reading import read_map
+from .map_reading import guess_by, map_reader, read_map
 from .moving_body import LOOK_LEFT, LOOK_RIGHT, MovingBody, Point, observed_body
 from .occupancy import SURE, posterior, seen_walls
 from .tracking import Tracker, aligned
@@ -116,6 +116,8 @@ class Senses:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
         self._body, self._odometry_noise = interface.body, interface.odometry_noise
+        reader = map_reader(interface)
+        self._guess = None if reader is None else guess_by(reader)
         lidar = interface.lidar or LidarModel()
         self._beams, self._camera = beams_of(lidar, 1 / self._cell_size, self._body.lidar_offset), None
         ranging = range_sensor(interface.sensors)
@@ -151,7 +153,7 @@ class Senses:
         else:
             if inputs.new_context[slot]:
                 # Another map and goal, on a map that lies as the one before.
-                reading = read_map(context, self._size)
+                reading = read_map(context, self._size, self._guess)
                 memory.belief.begin_leg(reading.walls, reading.goal)
                 memory.prior, memory.goal = memory.belief.mixture()
                 memory.searched[:] = False
@@ -178,7 +180,7 @@ class Senses:
         """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
         off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
-        reading, odometry = read_map(context, self._size), _pose(observed)
+        reading, odometry = read_map(context, self._size, self._guess), _pose(observed)
         if off_centre < _ROUNDING:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
             num_turns = 1 if context[START].any() else 8

@@ -42,6 +42,7 @@ _IDENTIFYING = (
     "agent_package",
     "agent_code_sha256",
     "checkpoint_sha256",
+    "map_reader_sha256",
 )
 # How many episodes there are, by the name of the option that says it.
 _COUNTING = {
@@ -220,7 +221,7 @@ def make_plan(
         **given,
         **({} if config is None else {"config": config.identity()}),
         "seed": options.seed,
-        **{name: getattr(origin, name) for name in _IDENTIFYING},
+        **{name: value for name in _IDENTIFYING if (value := getattr(origin, name)) or name != "map_reader_sha256"},
         "mujoco": origin.packages.get("mujoco"),
         "world_sha256": hashlib.sha256(world.to_xml().encode("utf-8")).hexdigest(),
     }

@@ -17,13 +17,14 @@ import pickle
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 from mazebench import stopping
 from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError, RunError, UnplayableError, describe_error
+from mazebench.errors import InputError, Remark, RunError, UnplayableError, describe_error
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Chunk, Result, run_chunk
 from mazebench.evaluation.eval_options import RunOptions
@@ -228,9 +229,10 @@ def plain(error: InputError | RunError) -> InputError | RunError:
 
 
 def _begin_worker(stop: multiprocessing.synchronize.Event) -> None:
-    """Makes a worker end with its parent."""
+    """Makes a worker end with its parent, and leaves remarks to it."""
     global _stop
     _stop = stop
+    warnings.simplefilter("ignore", Remark)
 
     def end_with_parent() -> None:
         multiprocessing.parent_process().join()  # type: ignore[union-attr]  # a worker has one

@@ -19,6 +19,7 @@ from mazebench.agent import Agent
 from mazebench.agent_loading import package_of
 from mazebench.constants import TASK_VERSION
 from mazebench.errors import InputError, one_line
+from mazebench.evaluation.checked_agent import calling
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.results.played import mazes_hash
@@ -48,12 +49,15 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
         package = f"{names[0]} {_version(names[0])}" if names else None
     else:
         package = package_of(options.agent)
+    with calling(options.agent, "map_reader"):
+        reader = agent_class.map_reader(task.interface)
     content = {
         "benchmark_manifest_sha256": manifest_hash(task.options.benchmark),
         "task_version": TASK_VERSION,
         "looks_version": LOOKS_VERSION if task.options.look == VARIED else None,
         "checkpoint": None if checkpoint is None else one_line(checkpoint),
         "checkpoint_sha256": file_hash(options.checkpoint),
+        "map_reader_sha256": file_hash(None if reader is None else str(reader)),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
         "agent_package": package,

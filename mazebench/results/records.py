@@ -126,6 +126,7 @@ class Provenance(_Stored):
     benchmark_manifest_sha256: str
     mazes_sha256: str
     checkpoint_sha256: str | None
+    map_reader_sha256: str | None = None  # of the file that `Agent.map_reader` names; left out where it names none
     agent_class: str  # as module:Class
     agent_package: str | None  # name and version; None for a `module:Class`
     agent_code_sha256: str | None  # of the agent's files, see `code_hash`; None where it is in no file
