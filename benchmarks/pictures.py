@@ -324,21 +324,21 @@ def draw_looks() -> None:
     """Draws six places in mazes of no split by the agent's camera, a look in each row."""
     envs = mazebench.make_vec("local", 6, kinds=("house", "rooms"), size=31, distances=(2, 3, 4))
     envs.reset(seed=SEEN)
-    rules, (gain, noise_at) = envs.rules, exposures_of(np.random.default_rng(SEEN), 6)
+    rules = envs.rules
+    light = {split: exposures_of(np.random.default_rng(SEEN), 6, split) for split in ("train", "dev", "eval")}
     as_it_is = np.ones(6, dtype=np.float32), np.full(6, -1)
     near, wide = Camera(size=96), Camera(size=96, fov=200)
     rows = (
-        ("egocentric", near, PLAIN, False, as_it_is),
-        ("egocentric", near, VARIED, False, (gain, noise_at)),
-        ("egocentric", near, VARIED, True, (gain, noise_at)),
-        ("egocentric", wide, VARIED, True, as_it_is),
-        ("depth", near, PLAIN, False, as_it_is),
-        ("labels", near, PLAIN, False, as_it_is),
+        ("egocentric", near, PLAIN, "train", as_it_is),
+        *(("egocentric", near, VARIED, split, light[split]) for split in light),
+        ("egocentric", wide, VARIED, "eval", as_it_is),
+        ("depth", near, PLAIN, "train", as_it_is),
+        ("labels", near, PLAIN, "train", as_it_is),
     )
-    sheet = np.full((6 * 100 - 4, 6 * 100 - 4, 3), 255, dtype=np.uint8)
-    for row, (name, camera, look, is_unseen, light) in enumerate(rows):
-        eye = RayCamera(envs.task.mazes, camera, look, is_unseen)
-        pictures = eye.take((name,), rules.maze, rules.pose, rules.marker, *light)[name]
+    sheet = np.full((len(rows) * 100 - 4, 6 * 100 - 4, 3), 255, dtype=np.uint8)
+    for row, (name, camera, look, split, exposures) in enumerate(rows):
+        eye = RayCamera(envs.task.mazes, camera, look, split)
+        pictures = eye.take((name,), rules.maze, rules.pose, rules.marker, *exposures)[name]
         for column, picture in enumerate(pictures):
             top, left = 100 * row, 100 * column
             sheet[top : top + 96, left : left + 96] = as_colors(name, picture)

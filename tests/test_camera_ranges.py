@@ -45,7 +45,7 @@ def test_rays_in_view(fov, count):
 @pytest.mark.parametrize("fov", SHIPPED)
 def test_ranges_that_the_network_is_sure_of_are_right(fov, look):
     """In mazes of dev, with patterns that it was not trained on."""
-    pictures, true = Pictures(Task.of("building", split="dev").mazes, fov, 3, is_unseen=True).draw(look, 256)
+    pictures, true = Pictures(Task.of("building", split="dev").mazes, fov, 3, "dev").draw(look, 256)
     ranges = CameraRanges(Camera(fov=fov), "navigator").read(pictures)[:, rays_in_view(fov)]
     is_sure = ~np.isnan(ranges)
     off = np.abs(ranges - true.clip(max=MAX_RANGE))[is_sure]

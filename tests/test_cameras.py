@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import pathlib
 
 import cv2
@@ -19,12 +20,16 @@ from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
+from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.plan import make_plan
+from mazebench.maps.benchmark import ALL_SPLITS, load_kind_mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, resized
 from mazebench.tasks.sensors.cameras import as_colors
+from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
-from mazebench.world.looks import Camera, look_of
+from mazebench.world.looks import EXPOSURES, LOOKS_VERSION, Camera, exposures_of, look_of, patterns
 from mazebench.world.ray_camera import RayCamera
 from mazebench.world.ray_casting import Lidar
 
@@ -96,15 +101,16 @@ assert close > 0.99 * colors
 
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "pictures.png"
 PICTURES = ("egocentric", "depth", "labels")
+MAZE = generate("dfs", 7, np.random.default_rng(0))
 
 
-def take(maze: Maze, camera: Camera, pose: np.ndarray, look: str = "plain", is_unseen: bool = False, threads: int = 1):
+def take(maze: Maze, camera: Camera, pose: np.ndarray, look: str = "plain", split: str = "train", threads: int = 1):
     """Returns pictures in one maze, with the goal a metre ahead of each body, and with noise if the look is varied."""
     count = len(pose)
     ahead = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2]), np.zeros(count)], axis=1)
     marker = ahead + pose * (1, 1, 0)
     gain, noise_at = np.ones(count, np.float32), np.arange(count) if look == "varied" else np.full(count, -1)
-    taker = RayCamera((maze,), camera, look, is_unseen)
+    taker = RayCamera((maze,), camera, look, split)
     return taker.take(PICTURES, np.zeros(count, int), pose, marker, gain, noise_at, threads)
 
 
@@ -240,19 +246,72 @@ class TestGeometry:
 
 
 class TestLooks:
-    def test_training_mazes_have_other_patterns_than_the_rest(self):
+    def test_train_dev_and_eval_mazes_have_patterns_of_their_own(self):
         mazes = [generate("dfs", 13, np.random.default_rng(seed)) for seed in range(60)]
-        seen, unseen = (
-            {*np.ravel([look_of(maze, "varied", each).patterns for maze in mazes])} for each in (False, True)
-        )
-        assert (len(seen), len(unseen), len(seen & unseen)) == (8 + 3, 4 + 2, 0)
-        options = {"sensors": "egocentric", "look": "varied"}
-        assert not Task.of(**options).options.is_unseen
-        assert resolve_for_evaluation(TaskOptions(**options)).options.is_unseen
+        drawn = [{*np.ravel([look_of(maze, "varied", split).patterns for maze in mazes])} for split in ALL_SPLITS]
+        assert [len(each) for each in drawn] == [8 + 3, 4 + 2, 4 + 2]
+        assert len(set().union(*drawn)) == 23
+        assert len(np.unique(patterns(), axis=0)) == len(patterns())
+
+    @pytest.mark.parametrize(
+        ("split", "expected"),
+        [
+            ("train", "eef7130c2f0f6918bf4713816a2e5613dd3fb280b699eccb456ccc3452a2cd33"),
+            ("dev", "7c37c0a65cf90d834b542ace6b9fd8bb2cb3bb682663324170e045eb8c5955f5"),
+        ],
+    )
+    def test_train_and_dev_mazes_look_as_in_version_1(self, split, expected):
+        masks = hashlib.sha256(patterns()[:51].tobytes()).hexdigest()
+        assert masks == "a3344cc1a343b61a9168536c017027d68360a83662c82c421282ece1a0343699"
+        of_mazes = hashlib.sha256()
+        for maze in load_kind_mazes(split):
+            for part in look_of(maze, "varied", split):
+                of_mazes.update(part.tobytes())
+        assert of_mazes.hexdigest() == expected
+        assert EXPOSURES[split] == (0.3, 2.2)
+
+    @pytest.mark.parametrize(
+        ("options", "in_environment", "in_evaluation"),
+        [
+            ({}, "train", "eval"),
+            ({"task": "rebuilt"}, "train", "dev"),
+            ({"task": "rebuilt", "split": "eval"}, "eval", "eval"),
+            ({"kinds": ("cave",), "distances": (2,)}, "train", "dev"),
+            ({"mazes": MAZE, "distances": (2,)}, "train", "dev"),
+            ({"mazes": MAZE, "distances": (2,), "split": "eval"}, "dev", "dev"),
+            ({"mazes": MAZE, "distances": (2,), "split": "train"}, "train", "train"),
+            ({"task": "building", "mazes": "real:cafe"}, "eval", "eval"),
+        ],
+    )
+    def test_own_mazes_never_look_as_eval_mazes_do(self, options, in_environment, in_evaluation):
+        options = {"sensors": "egocentric", "look": "varied", **options}
+        assert Task.of(**options).options.look_split == in_environment
+        assert resolve_for_evaluation(TaskOptions.of(options)).options.look_split == in_evaluation
+
+    @pytest.mark.parametrize("split", ALL_SPLITS)
+    def test_an_environment_has_the_patterns_and_exposures_of_its_split(self, split):
+        options = {"sensors": "egocentric", "look": "varied", "camera_size": 16}
+        env = mazebench.make_vec("building", 8, split=split, **options)
+        observations, _ = env.reset(seed=3)
+        rules, streams = env.rules, [episode.stream(Stream.PICTURE_NOISE) for episode in env.rules.episodes]
+        light = [exposures_of(rng, 1, split) for rng in streams]
+        gain, noise_at = (np.concatenate(each) for each in zip(*light, strict=True))
+        camera = RayCamera(env.task.mazes, Camera(16), "varied", split)
+        expected = camera.take(("egocentric",), rules.maze, rules.pose, rules.marker, gain, noise_at)
+        np.testing.assert_equal(observations["egocentric"], expected["egocentric"])
+        darkest, brightest = EXPOSURES[split]
+        gain, _ = exposures_of(np.random.default_rng(0), 4096, split)
+        assert (gain.min(), gain.max()) == pytest.approx((darkest, brightest), rel=0.01)
+        env.close()
+
+    def test_results_have_the_version_of_the_looks(self):
+        for look, version in (("plain", None), ("varied", LOOKS_VERSION)):
+            task = TaskOptions(task="building", sensors=("egocentric",), look=look)
+            assert make_plan(EvalOptions(agent="random", task=task)).provenance.looks_version == version
 
     def test_equal_walls_look_equal(self):
         one, other = (generate("dfs", 13, np.random.default_rng(seed)) for seed in (0, 1))
-        looks = [look_of(maze, "varied", False) for maze in (one, Maze(one.walls, "another name"), other)]
+        looks = [look_of(maze, "varied", "train") for maze in (one, Maze(one.walls, "another name"), other)]
         np.testing.assert_equal(looks[0], looks[1])
         assert not np.array_equal(looks[0].colors, looks[2].colors)
 
@@ -266,8 +325,8 @@ def golden_pictures() -> np.ndarray:
     maze = generate("rooms", 15, np.random.default_rng(3))
     pose = free_poses(maze, np.random.default_rng(8), 3)
     rows = []
-    for look, is_unseen, fov in (("plain", False, 75), ("varied", False, 75), ("varied", True, 200)):
-        seen = take(maze, Camera(24, fov), pose, look, is_unseen)
+    for look, split, fov in (("plain", "train", 75), ("varied", "train", 75), ("varied", "dev", 200)):
+        seen = take(maze, Camera(24, fov), pose, look, split)
         rows.append(np.concatenate([as_colors(name, each) for name in PICTURES for each in seen[name]], axis=1))
     return np.concatenate(rows)
 

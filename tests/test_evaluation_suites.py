@@ -72,7 +72,7 @@ class TestParts:
                 "varied",
                 (64, 75),
             )
-            assert task.options.is_unseen
+            assert task.options.look_split == (split.removeprefix("-") or "eval")
             assert (by_camera.name, task.replace(sensors=(), look="plain")) == (
                 part.name,
                 resolve_for_evaluation(part.task),

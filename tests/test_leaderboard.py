@@ -25,6 +25,7 @@ from mazebench.report.leaderboard import (
 )
 from mazebench.results.reading import SUITE
 from mazebench.storage.json_files import write_json
+from mazebench.world.looks import LOOKS_VERSION
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "leaderboard.md"
 
@@ -120,6 +121,10 @@ class TestPage:
         shutil.copytree(suite, tmp_path / "by-camera")
         for path in (tmp_path / "by-camera").glob("x/*"):
             edit_task(path, sensors=["egocentric"], look="varied")
+        with pytest.raises(InputError, match="expected pictures in version 2 of the looks, found version 1"):
+            read_entries([tmp_path / "by-camera"])
+        for path in (tmp_path / "by-camera").glob("x/*"):
+            edit_summary(path, provenance=read_summary(path)["provenance"] | {"looks_version": LOOKS_VERSION})
         write_leaderboard(read_entries([suite, tmp_path / "by-camera"]), page)
         assert {(kept.agent, kept.division) for kept in kept_entries(page)} == {("x", "camera"), ("x", "lidar")}
         assert [line for line in page.read_text().splitlines() if line.startswith("#")] == [

@@ -76,7 +76,7 @@ class TestDoors:
         for top, left, bottom, right in stands.boxes:
             covered[top:bottom, left:right] += 1
         np.testing.assert_array_equal(covered, stands.walls)
-        before, after = (look_of(each, VARIED, is_unseen=False) for each in (maze, stands))
+        before, after = (look_of(each, VARIED, "train") for each in (maze, stands))
         assert all(np.array_equal(*pair) for pair in zip(before[1:], after[1:], strict=True))
         assert np.argwhere(before.grid != after.grid).tolist() == [[12 - NEAR[0], NEAR[1]]]
         assert pickle.loads(pickle.dumps(stands)).walls[NEAR]  # noqa: S301

@@ -23,6 +23,7 @@ from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 CORRIDOR = corridor()
 # No free cell at the corners (1, 5) and (5, 1): (2, 5) and (4, 1) are the nearest.
@@ -72,8 +73,11 @@ class TestValue:
         task = Task.of(mazes=tmp_path / "corridor.txt", cell_size=0.6)
         assert Task.from_json(task.options.to_json()).mazes == task.mazes == (resized(CORRIDOR, 0.6),)
 
-    def test_an_agent_learns_neither_the_track_nor_its_level(self):
-        assert Task.of("building").interface == Task.of("rebuilt", level=3).interface
+    def test_the_interface_tells_levels_of_adrift_and_rough_and_no_others(self):
+        interfaces = {(track, level): Task.of(track, level=level).interface for track in TRACKS for level in LEVELS}
+        told = {(track, level) for track in ("adrift", "rough") for level in LEVELS}
+        for one, other in itertools.combinations(interfaces, 2):
+            assert (interfaces[one] == interfaces[other]) == (not told & {one, other})
 
     def test_results_of_one_setting_differ_in_what_an_agent_chooses_only(self):
         plain = resolve_for_evaluation(TaskOptions(size=15))

@@ -48,17 +48,17 @@ _SAME_MASKS = 8  # batches with the same patterns
 class Pictures:
     """A stream of pictures and true ranges at random poses."""
 
-    def __init__(self, mazes: Mazes, fov: float, seed: int, is_unseen: bool = False):
-        """Draws with the patterns of training mazes or, if `is_unseen`, with the others."""
+    def __init__(self, mazes: Mazes, fov: float, seed: int, split: str = "train"):
+        """Draws with the patterns of a split."""
         self._mazes, self._rng, self._rays = mazes, np.random.default_rng(seed), rays_in_view(fov)
-        self._cameras = {look: RayCamera(mazes, Camera(fov=fov), look, is_unseen) for look in LOOKS}
-        self._lidar, self._num_drawn, self._is_unseen = Lidar(mazes), 0, is_unseen
+        self._cameras = {look: RayCamera(mazes, Camera(fov=fov), look, split) for look in LOOKS}
+        self._lidar, self._num_drawn, self._split = Lidar(mazes), 0, split
         self._pool = self._rng.integers(len(mazes), size=min(_NUM_MAZES, len(mazes)))
 
     def draw(self, look: str, count: int = _BATCH) -> tuple[np.ndarray, np.ndarray]:
         """Returns pictures `[count, 64, 64, 3]` uint8 and ranges `[count, R]` float32 in m."""
         rng = self._rng
-        if look == VARIED and not self._is_unseen and self._num_drawn % _SAME_MASKS == 0:
+        if look == VARIED and self._split == "train" and self._num_drawn % _SAME_MASKS == 0:
             self._cameras[look].masks = other_patterns(rng)
         self._num_drawn += 1
         self._pool[rng.integers(len(self._pool))] = rng.integers(len(self._mazes))
@@ -71,7 +71,7 @@ class Pictures:
         marker = np.where(rng.random((count, 1)) < _MARKED, marker, -10.0)
         gain, noise_at = np.ones(count, np.float32), np.full(count, -1)
         if look == VARIED:
-            gain, noise_at = exposures_of(rng, count)
+            gain, noise_at = exposures_of(rng, count, self._split)
         marker = np.column_stack([marker, np.zeros(count)])
         pictures = self._cameras[look].take(("egocentric",), maze, pose, marker, gain, noise_at)["egocentric"]
 
@@ -98,7 +98,7 @@ def other_patterns(rng: np.random.Generator) -> np.ndarray:
     """Returns patterns as `looks.patterns` does, with mixtures of turned and inverted ones for training mazes."""
     masks = patterns()
     whole = masks[:, : TEXELS**2].reshape(-1, TEXELS, TEXELS).astype(np.float64)
-    for chosen in (WALLS[False], FLOORS[False]):
+    for chosen in (WALLS["train"], FLOORS["train"]):
         drawn = []
         for number in chosen:
             parts = [whole[number], whole[rng.choice(chosen)]]
@@ -138,7 +138,7 @@ def train(fov: float, updates: int, seed: int) -> Iterator[tuple[int, float, Ran
 def errors(network: RangeNetwork, fov: float, look: str, count: int = 1536) -> list[str]:
     """Returns rows of a table: errors on dev mazes, with patterns that were not trained on."""
     mazes = Task.of("building", split="dev").mazes
-    drawn = [Pictures(mazes, fov, 10 + part, is_unseen=True).draw(look, 256) for part in range(count // 256)]
+    drawn = [Pictures(mazes, fov, 10 + part, "dev").draw(look, 256) for part in range(count // 256)]
     pictures, true = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     ranges, scales = network.read(pictures)
     off = np.abs(np.minimum(ranges, MAX_RANGE) - np.minimum(true, MAX_RANGE))

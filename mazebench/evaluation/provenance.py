@@ -27,6 +27,7 @@ from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
 from mazebench.storage.json_files import parse_json
 from mazebench.tasks.task import Task
+from mazebench.world.looks import LOOKS_VERSION, VARIED
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
@@ -53,6 +54,7 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
     content = {
         "benchmark_manifest_sha256": manifest_hash(task.options.benchmark),
         "task_version": TASK_VERSION,
+        "looks_version": LOOKS_VERSION if task.options.look == VARIED else None,
         "checkpoint": None if checkpoint is None else one_line(checkpoint),
         "checkpoint_sha256": file_hash(options.checkpoint),
         "map_reader_sha256": file_hash(None if reader is None else str(reader)),

@@ -33,6 +33,7 @@ from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import LEVELS, STANDING
 from mazebench.tasks.trials import frozen_trials
 from mazebench.world.bodies import SLIDER
+from mazebench.world.looks import LOOKS_VERSION, VARIED
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
 PARTS = [f"{track} {level}" for track in STANDING for level in LEVELS]
@@ -173,6 +174,9 @@ def _read_episodes(result: Result) -> pd.DataFrame:
         raise InputError(f"{result.folder}: expected eval episodes of a track, with its senses, found {found}")
     if provenance.benchmark_manifest_sha256 != manifest_hash(summary.benchmark):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
+    if task.look == VARIED and provenance.looks_version != LOOKS_VERSION:
+        found = f"version {provenance.looks_version or 1}"
+        raise InputError(f"{result.folder}: expected pictures in version {LOOKS_VERSION} of the looks, found {found}")
     mazes, trials = load_kind_mazes("eval"), frozen_trials("local", KINDS_SIZE, task.benchmark, "eval")
     episodes = [(trial.episode, trial.oracle_steps) for trial in trials]
     frozen = [(mazes[each.maze].name, each.start, each.goal, each.seed, steps) for each, steps in episodes]

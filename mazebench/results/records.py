@@ -122,6 +122,7 @@ class Provenance(_Stored):
     seed: Count
     episodes_per_distance: Count | None  # None: 48 in each maze
     task_version: int
+    looks_version: int | None = None  # of pictures in `varied`; None also where version 1 drew them
     benchmark_manifest_sha256: str
     mazes_sha256: str
     checkpoint_sha256: str | None

@@ -13,7 +13,10 @@ from mazebench.world.ray_casting import LidarModel
 
 @dataclasses.dataclass(frozen=True)
 class Interface:
-    """The environments that an agent is built for."""
+    """The environments that an agent is built for.
+
+    No field names a track or a level, but `odometry_noise` and `context_size` differ between some of them.
+    """
 
     task: str  # "local" or "hierarchical"
     size: int  # N

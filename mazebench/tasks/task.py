@@ -162,7 +162,7 @@ class Task:
 
     @property
     def interface(self) -> Interface:
-        """The part of the task that an agent may know: neither the track nor its level."""
+        """The part of the task that an agent may know. It names no track or level, but some can be inferred."""
         options = self.options
         told: dict[str, Any] = {}
         for perturbation in itertools.chain(*map(self.perturbations, self.levels or LEVELS[:1])):

@@ -14,6 +14,7 @@ from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, one_line
 from mazebench.maps.benchmark import (
     ALL_SPLITS,
+    DEV,
     DOORS_BENCHMARK,
     FROZEN_SPLITS,
     GOALS_BENCHMARK,
@@ -373,9 +374,10 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         return {name: value for name, value in values.items() if value is not None}
 
     @property
-    def is_unseen(self) -> bool:
-        """True if mazes have patterns that training mazes don't have: those of other splits than train."""
-        return self.split not in (None, "train")
+    def look_split(self) -> str:
+        """The split whose patterns and exposures pictures have; eval's are of the benchmark's own mazes alone."""
+        is_own = self.mazes is not None and not is_real(self.mazes)
+        return DEV if is_own and self.split == "eval" else self.split or "train"
 
     # Which options go together.
 

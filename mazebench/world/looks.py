@@ -2,7 +2,7 @@
 
 A pattern is a mask between two colours. In the look `plain`, all mazes have MuJoCo's colours and flat light. In
 `varied`, a hash of the walls draws patterns, colours and light, so equal mazes look equal, and in a maze that was never
-seen a pattern says nothing about the place on the map.
+seen a pattern says nothing about the place on the map. Train, dev and eval mazes have patterns of their own.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from mazebench.maps.benchmark import DEV
 from mazebench.maps.maze import Maze
+
+# It increases when pictures in `varied` change. Since version 2, eval mazes have patterns and exposures of their own.
+LOOKS_VERSION = 2
 
 PLAIN, VARIED = LOOKS = ("plain", "varied")
 
@@ -28,7 +32,8 @@ SKY_COLOR, HORIZON_COLOR = (0.62, 0.76, 0.90), (0.93, 0.96, 0.98)
 AMBIENT, HEADLIGHT, SUN = 0.35, 0.25, 0.55
 SUN_DIRECTION = (0.3, 0.4, -1.0)
 
-EXPOSURES = (0.3, 2.2)  # the darkest and the brightest of pictures in `varied`
+# The darkest and the brightest of pictures in `varied`, by split.
+EXPOSURES = {"train": (0.3, 2.2), DEV: (0.3, 2.2), "eval": (0.25, 2.6)}
 NOISE = 4.0  # levels, the standard deviation of the noise of a pixel in `varied`
 NUM_NOISE = 2**18  # places in a table at which the noise of a picture may begin
 
@@ -48,10 +53,10 @@ _CELLS_PER_REGION = 4  # a side
 _SIGN_SHARE = 0.15  # of the wall cells
 
 _NUM_SIGNS = 32
-# Where the patterns are among `patterns()`: those that training mazes have, and those that dev and eval mazes have.
+# Where the patterns are among `patterns()`, by split.
 _PLAIN_WALL, _PLAIN_FLOOR = 0, 1
-WALLS = {False: range(2, 10), True: range(10, 14)}  # by whether they are unseen in training
-FLOORS = {False: range(14, 17), True: range(17, 19)}
+WALLS = {"train": range(2, 10), DEV: range(10, 14), "eval": range(51, 55)}
+FLOORS = {"train": range(14, 17), DEV: range(17, 19), "eval": range(55, 57)}
 _SIGNS = range(19, 19 + _NUM_SIGNS)
 
 
@@ -81,8 +86,8 @@ class Look(NamedTuple):
     fading: np.ndarray  # [] float32, 1/m^2: light at depth d is divided by 1 + fading d^2
 
 
-def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
-    """Returns a look, "plain" or "varied", of a maze; if `is_unseen`, with patterns that training mazes don't have."""
+def look_of(maze: Maze, look: str, split: str) -> Look:
+    """Returns a look, "plain" or "varied", of a maze, with the patterns of a split, one of `WALLS`."""
     if look == PLAIN:
         return _plain_look(maze)
     rng = rng_of(maze)
@@ -104,16 +109,16 @@ def look_of(maze: Maze, look: str, is_unseen: bool) -> Look:
     angle, sun = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.6)
     return Look(
         grid=np.where(maze.walls, signs, surfaces)[::-1].astype(np.int8),
-        patterns=np.array([*rng.choice(WALLS[is_unseen], NUM_SURFACES), rng.choice(FLOORS[is_unseen])]),
+        patterns=np.array([*rng.choice(WALLS[split], NUM_SURFACES), rng.choice(FLOORS[split])]),
         colors=_steps(pairs),
         light=_light(rng.uniform(0.4, 0.75), rng.uniform(0.1, 0.35), sun * np.cos(angle), sun * np.sin(angle)),
         fading=np.array(rng.uniform(0, 0.03), dtype=np.float32),
     )
 
 
-def exposures_of(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+def exposures_of(rng: np.random.Generator, count: int, split: str = "train") -> tuple[np.ndarray, np.ndarray]:
     """Returns the exposures of `count` pictures in `varied`, `[B]` float32, and where their noise begins, `[B]` int."""
-    darkest, brightest = np.log(EXPOSURES)
+    darkest, brightest = np.log(EXPOSURES[split])
     return np.exp(rng.uniform(darkest, brightest, count)).astype(np.float32), rng.integers(NUM_NOISE, size=count)
 
 
@@ -154,7 +159,7 @@ def _light(ambient: float, headlight: float, sun_x: float, sun_y: float) -> np.n
 
 @functools.cache
 def patterns() -> np.ndarray:
-    """Returns the masks of all patterns: `[19 + signs, T]` uint8, each at 64, 32, ... 1 texels a side, flattened.
+    """Returns the masks of all patterns: `[25 + signs, T]` uint8, each at 64, 32, ... 1 texels a side, flattened.
 
     Rows are from the bottom to the top of a wall.
     """
@@ -169,10 +174,13 @@ def patterns() -> np.ndarray:
         total = sum(scipy.ndimage.zoom(w, TEXELS // len(w), order=1, mode="grid-wrap", grid_mode=True) for w in waves)
         return (total - np.min(total)) / np.ptp(total)
 
+    def distances(count: int) -> np.ndarray:  # to the nearest and the second of some stones
+        stones = rng.random((count, 2, 1, 1)) * TEXELS
+        away = np.hypot(*(np.stack([x - stones[:, 0], y - stones[:, 1]]) + TEXELS // 2) % TEXELS - TEXELS // 2)
+        return np.sort(away, axis=0)[:2]
+
     shifted = (x + 16 * (y // 8 % 2)) % 32  # every second row of bricks
-    stones = rng.random((24, 2, 1, 1)) * TEXELS
-    distances = np.hypot(*(np.stack([x - stones[:, 0], y - stones[:, 1]]) + TEXELS // 2) % TEXELS - TEXELS // 2)
-    nearest, second = np.sort(distances, axis=0)[:2]
+    nearest, second = distances(24)
     frame = np.maximum(np.abs(x - 32), np.abs(y - 32))
     walls = [
         np.where((y % 8 == 0) | (shifted == 0), 0, 0.55 + 0.35 * each(8, 16)) * (0.8 + 0.2 * rough()),  # bricks
@@ -183,7 +191,7 @@ def patterns() -> np.ndarray:
         0.85 * ((x // 16 + y // 16) % 2) + 0.1 * rough(),  # checks
         np.where(second - nearest < 2.5, 0, 0.45 + 0.5 * rough()),  # rubble
         np.where(frame > 28, 0.25, 0.75) + 0.2 * rough() - 0.2 * (frame == 27),  # panels
-        # Those of dev and eval mazes.
+        # Those of dev mazes.
         0.9 * ((x + y) // 8 % 2),  # slanted bands
         0.7 * (y // 8 % 2) + 0.2 * rough(),  # level bands
         0.9 * (np.hypot(x % 16 - 8, y % 16 - 8) < 4.5) + 0.1 * rough(),  # dots
@@ -193,7 +201,7 @@ def patterns() -> np.ndarray:
         np.where((x == 0) | (y == 0), 0, 0.8 + 0.2 * rough()),  # cells
         np.where((x % 32 == 0) | (y % 32 == 0), 0.1, 0.6 + 0.3 * rough()),  # tiles
         0.7 * ((x // 32 + y // 32) % 2) + 0.2 * rough(),  # checks
-        # Those of dev and eval mazes.
+        # Those of dev mazes.
         np.where(y % 8 == 0, 0, 0.5 + 0.4 * each(8, 64)) * (0.8 + 0.2 * rough()),  # boards
         0.3 + 0.7 * rough(),  # carpet
     ]
@@ -202,7 +210,20 @@ def patterns() -> np.ndarray:
     drawings = np.pad(np.concatenate([halves, halves[..., 1::-1]], axis=2), ((0, 0), (1, 1), (1, 1)))
     signs = [np.pad(np.kron(drawing, np.ones((9, 9)))[:62, :62], 1, constant_values=1) for drawing in drawings]
     plain_lines = 0.5 * ((x % 63 == 0) | (y % 63 == 0))  # half of a texel on each side of a cell's border
-    return flattened(np.stack([np.zeros_like(plain_lines), plain_lines, *walls, *floors, *signs]).clip(0, 1) * 255)
+    masks = [np.zeros_like(plain_lines), plain_lines, *walls, *floors, *signs]
+
+    # Those of eval mazes, from a generator of their own, so that the others do not depend on them.
+    rng = np.random.default_rng(1)
+    is_level = (x // 16 + y // 16) % 2 == 0
+    masks += [
+        0.85 * ((y + abs(x % 32 - 16)) // 8 % 2) + 0.1 * rough(),  # chevrons
+        np.where(((x + y) % 16 < 3) | ((x - y) % 16 < 3), 0.05, 0.55 + 0.4 * rough()),  # lattice
+        np.hypot((x + 8 * (y // 8 % 2)) % 16 - 8, y % 8) / 12 * (0.8 + 0.2 * rough()),  # scales
+        np.where(np.cumsum(rng.random(TEXELS) < 0.2)[x] % 2, 0.1, 0.7 + 0.2 * rough()),  # stripes of several widths
+        np.where(np.where(is_level, y, x) % 4 == 0, 0.1, 0.3 + 0.6 * each(16, 16)),  # parquet
+        np.where(distances(60)[0] < 3, 0.95, 0.15 + 0.25 * rough()),  # terrazzo
+    ]
+    return flattened(np.stack(masks).clip(0, 1) * 255)
 
 
 def flattened(masks: np.ndarray) -> np.ndarray:

@@ -219,11 +219,11 @@ def _noise() -> np.ndarray:
 class RayCamera:
     """The camera of bodies in some mazes of one size."""
 
-    def __init__(self, mazes: StandingMazes, camera: Camera, look: str = looks.PLAIN, is_unseen: bool = False):
+    def __init__(self, mazes: StandingMazes, camera: Camera, look: str = looks.PLAIN, split: str = "train"):
         """Takes pictures of a look, as `looks.look_of`."""
         self._camera, self._cell_size = camera, mazes[0].cell_size
         self._lens = lens_of(camera, self._cell_size)
-        self._looks = MazeRows(lambda maze: looks.look_of(mazes[maze], look, is_unseen))
+        self._looks = MazeRows(lambda maze: looks.look_of(mazes[maze], look, split))
         self.masks = looks.patterns()  # for a learner that draws others
         self._threads: ThreadPoolExecutor | None = None  # which end with it
 

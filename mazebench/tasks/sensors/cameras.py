@@ -54,8 +54,8 @@ class CameraOptions(SensorOptions):
         str,
         OneOf(*LOOKS),
         Doc(
-            "plain: flat colours; varied: patterns, colours, light and signs that are each maze's own (training mazes "
-            "have other patterns than the rest), with an exposure and noise that are each picture's own."
+            "plain: flat colours; varied: patterns, colours, light and signs that are each maze's own (train, dev and "
+            "eval mazes have different patterns), with an exposure and noise that are each picture's own."
         ),
     ] = PLAIN
 
@@ -92,11 +92,12 @@ class CameraSensor(Sensor[CameraOptions]):
 
         self._names = names
         self.stream = Stream.PICTURE_NOISE if options.look == VARIED else None
-        self._camera = RayCamera(mazes, options.camera, options.look, options.is_unseen)
+        self._camera = RayCamera(mazes, options.camera, options.look, options.look_split)
+        self._exposures = np.log(EXPOSURES[options.look_split])
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, H, H, ...]` by name, as in `PICTURES`."""
-        count, (darkest, brightest) = len(worlds.pose), np.log(EXPOSURES)
+        count, (darkest, brightest) = len(worlds.pose), self._exposures
         gain, noise_at = np.ones(count, dtype=np.float32), np.full(count, -1)
         for i, rng in enumerate(worlds.rngs):
             if rng is not None:

@@ -31,9 +31,9 @@ class SensorOptions(Options):
         return SLIDER
 
     @property
-    def is_unseen(self) -> bool:
-        """True if mazes have patterns that training mazes don't have."""
-        return False
+    def look_split(self) -> str:
+        """The split whose patterns and exposures pictures have."""
+        return "train"
 
 
 OwnOptions = TypeVar("OwnOptions", bound=SensorOptions)
