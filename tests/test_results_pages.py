@@ -100,7 +100,7 @@ class TestReproduction:
     def test_every_table_of_the_pages_is_listed(self, page):
         text = (ROOT / page).read_text(encoding="utf-8")
         for name in re.findall(r"^<!-- table: (.+) -->$", text, re.MULTILINE):
-            assert re.search(rf"^\| `{name}` \| [^|]+ \| [^|]+ \|", self.PAGE, re.MULTILINE), name
+            assert re.search(rf"\| `{name}` \|$", self.PAGE, re.MULTILINE), name
 
     def test_every_checkpoint_that_ships_has_its_hash_and_recipe(self):
         shipped = {

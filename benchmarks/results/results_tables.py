@@ -230,21 +230,26 @@ def published(_: Kept) -> str:
 
     The times are those of the rows of docs/reproduce.md that begin with an archive.
     """
-    costs = re.findall(r"^\| `([\w/-]+)` \|.*\| (\d+) \| (\d+) \|$", (ROOT / PAGES[-1]).read_text("utf-8"), re.MULTILINE)
+    costs = re.findall(
+        r"^\| `([\w/-]+)` \|.*\| (\d+) \| (\d+) \|$", (ROOT / PAGES[-1]).read_text("utf-8"), re.MULTILINE
+    )
     minutes = {name: (int(evaluation), int(training)) for name, evaluation, training in costs}
     rows = []
     for page in PAGES[:-1]:
         text = (ROOT / page).read_text(encoding="utf-8")
         for block in _BLOCK.finditer(text):
-            title = re.findall(r"^#+ (.+)$", text[: block.start()], re.MULTILINE)[-1]
-            slug = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
-            place = f"[{title}]({page.removeprefix('docs/')}#{slug})" if page.startswith("docs/") else f"{page}, {title}"
+            first, *titles = re.findall(r"^#+ (.+)$", text[: block.start()], re.MULTILINE)
+            title = titles[-1] if titles else first
+            slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", title.lower()))
+            place = ": ".join([first, *titles[-1:]])
+            is_on_site = page.startswith("docs/")
+            place = f"[{place}]({page.removeprefix('docs/')}#{slug})" if is_on_site else f"{page}: {title}"
             archives = re.findall(rf"`([^`]+)`(?=.* \(\[commands)", block[0].rpartition(f"\n{_SOURCE}")[2])
             parts = [minutes[name] for name in archives if name in minutes]
             times = [str(sum(each)) for each in zip(*parts, strict=True)] if parts else ["", ""]
             names = ", ".join(f"`{name}`" for name in archives) or "none: made from `assets/real`"
-            rows.append([f"`{block[2]}`", place, names, *times])
-    return format_table(["table", "place", "archives", "evaluation, minutes", "training, minutes"], rows)
+            rows.append([place, *times, names, f"`{block[2]}`"])
+    return format_table(["table", "evaluation, minutes", "training, minutes", "archives", "name in its page"], rows)
 
 
 def report_table(kept: Kept, name: str, metric: str) -> str:
