@@ -1,7 +1,7 @@
 """Writes where the project lives into the files that say so: `python -m benchmarks.address`.
 
-The address of the repository is `Source` in the table `project.urls` of pyproject.toml, and stands nowhere else by hand.
-Without one, the files name none. README.md gets the citation of CITATION.cff, too, as BibTeX.
+The address of the repository is `Source` in the table `project.urls` of pyproject.toml, and is written by hand nowhere
+else. Without one, the files name none. README.md gets the citation of CITATION.cff, too, as BibTeX.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Additions to mkdocs.yml: fields explained by comments or `Doc`, figures that stay on one line, widths of cells, the link
-to the repository.
-"""
+"""Additions to mkdocs.yml: fields explained by comments or `Doc`, unbroken figures, widths of cells, the repository."""
 
 from __future__ import annotations
 

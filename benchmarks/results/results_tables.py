@@ -238,13 +238,13 @@ def published(_: Kept) -> str:
     for page in PAGES[:-1]:
         text = (ROOT / page).read_text(encoding="utf-8")
         for block in _BLOCK.finditer(text):
-            first, *titles = re.findall(r"^#+ (.+)$", text[: block.start()], re.MULTILINE)
-            title = titles[-1] if titles else first
-            slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", title.lower()))
-            place = ": ".join([first, *titles[-1:]])
+            first, titles = text.partition("\n")[0], re.findall(r"^##+ (.+)$", text[: block.start()], re.MULTILINE)
+            section = titles[-1] if titles else first.removeprefix("# ")
+            place = ": ".join([first.removeprefix("# "), *titles[-1:]])
+            slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", section.lower()))
             is_on_site = page.startswith("docs/")
-            place = f"[{place}]({page.removeprefix('docs/')}#{slug})" if is_on_site else f"{page}: {title}"
-            archives = re.findall(rf"`([^`]+)`(?=.* \(\[commands)", block[0].rpartition(f"\n{_SOURCE}")[2])
+            place = f"[{place}]({page.removeprefix('docs/')}#{slug})" if is_on_site else f"{page}: {section}"
+            archives = re.findall(r"`([^`]+)`(?=.* \(\[commands)", block[0].rpartition(f"\n{_SOURCE}")[2])
             parts = [minutes[name] for name in archives if name in minutes]
             times = [str(sum(each)) for each in zip(*parts, strict=True)] if parts else ["", ""]
             names = ", ".join(f"`{name}`" for name in archives) or "none: made from `assets/real`"
