@@ -1,10 +1,12 @@
-"""Additions to mkdocs.yml: fields explained by comments or `Doc`, figures that stay on one line, widths of cells."""
+"""Additions to mkdocs.yml: fields explained by comments or `Doc`, unbroken figures, widths of cells, the repository."""
 
 from __future__ import annotations
 
 import ast
+import pathlib
 import re
 import textwrap
+import tomllib
 
 import griffe
 
@@ -14,6 +16,13 @@ _SHAPE = re.compile(r"^\[[^\]]*\]")
 _FIGURES = re.compile(r"\d?\.\d+ \[[-+]?\d?\.\d+, [-+]?\d?\.\d+\]|\d?\.\d+(?: / [-+]?\d?\.\d+)+|</code> \d\b")
 _CELL = re.compile(r"<td([^>]*)>(.*?)</td>", re.DOTALL)
 _SHORT, _LONG = 24, 60  # letters of a cell that a phone shows on one line, and of one that needs some width
+
+
+def on_config(config, **kwargs) -> None:
+    """Links the repository at the top of each page, once pyproject.toml names it."""
+    project = pathlib.Path(config.config_file_path).with_name("pyproject.toml")
+    if source := tomllib.loads(project.read_text(encoding="utf-8"))["project"]["urls"].get("Source"):
+        config.repo_url, config.repo_name = source, config.site_name
 
 
 def on_page_content(html: str, **kwargs) -> str:

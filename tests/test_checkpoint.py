@@ -131,4 +131,4 @@ def test_the_page_of_shipped_checkpoints_says_what_their_files_say(path):
     parameters = sum(tensor.numel() for tensor in tensors.values())
     steps, updates = (metadata["provenance"][name] for name in ("env_steps", "updates"))
     row = f"| `{path.stem}` | {parameters:,} | {steps:,} | {updates:,} |"
-    assert row in (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+    assert row in (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import pathlib
 import re
 import shlex
@@ -21,6 +22,7 @@ from sybil.parsers.markdown import SkipParser
 from sybil.parsers.markdown.lexers import FencedCodeBlockLexer
 
 import mazebench
+from benchmarks import address
 from mazebench import cli
 from mazebench.maps.kinds import generate
 from mazebench.maps.pictures import draw_maze, write_image
@@ -173,3 +175,20 @@ def test_change_log_and_citation_name_the_version():
     version, date = re.search(r"^## (\S+), (.+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M).groups()
     assert version == mazebench.__version__ == citation["version"]
     assert date == str(citation.get("date-released", "unreleased"))
+
+
+def test_files_have_the_address_of_pyproject_and_the_citation():
+    for path, text in address.written():
+        assert path.read_text(encoding="utf-8") == text, "`python -m benchmarks.address` writes them"
+
+
+def test_an_address_is_written_wherever_one_belongs_and_can_be_taken_away():
+    for name in address.FILES:
+        now = (ROOT / name).read_text(encoding="utf-8")
+        text = address.with_address(name, now, "https://example.org/mazebench")
+        assert "https://example.org/mazebench" in text
+        assert address.with_address(name, text, address.address()) == now
+        if name == address.CITATION:
+            assert yaml.safe_load(text)["repository-code"] == "https://example.org/mazebench"
+        if name == address.NOTEBOOK:
+            assert 'ADDRESS = "https://example.org/mazebench"' in json.loads(text)["cells"][1]["source"][4]

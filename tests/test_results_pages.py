@@ -6,6 +6,7 @@ import collections
 import hashlib
 import json
 import re
+import shlex
 import tarfile
 
 import pandas as pd
@@ -82,12 +83,42 @@ def test_columns_of_the_ceilings_are_of_code_that_was_shown_equal():
     assert is_one_code(played)
 
 
-def test_every_archive_has_a_command(archives):
-    page = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
-    [commands] = re.findall(r"^## Records\n(.*?)^## ", page, re.DOTALL | re.MULTILINE)
-    training = {path.name.removesuffix(".tar.xz") for path in (RECORDS / "training").glob("*.tar.xz")}
-    named = set(re.findall(r"(?:results|runs)/([\w-]+)", commands))
-    assert {*archives, *training} - named == set()
+class TestReproduction:
+    """docs/reproduce.md names all that was published."""
+
+    PAGE = (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")
+
+    def test_every_archive_has_a_command_and_its_minutes(self, archives):
+        [commands] = re.findall(r"^## Commands\n(.*?)^## ", self.PAGE, re.DOTALL | re.MULTILINE)
+        training = {path.name.removesuffix(".tar.xz") for path in (RECORDS / "training").glob("*.tar.xz")}
+        named = set(re.findall(r"(?:results|runs)/([\w-]+)", commands))
+        assert {*archives, *training} - named == set()
+        timed = set(re.findall(r"^\| `([\w/-]+)` \|.*\| \d+ \| \d+ \|$", commands, re.MULTILINE))
+        assert timed == {*archives, *(f"training/{name}" for name in training)}
+
+    @pytest.mark.parametrize("page", [page for page in DOCS if page != PAGES[-1]])
+    def test_every_table_of_the_pages_is_listed(self, page):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        for name in re.findall(r"^<!-- table: (.+) -->$", text, re.MULTILINE):
+            assert re.search(rf"\| `{name}` \|$", self.PAGE, re.MULTILINE), name
+
+    def test_every_checkpoint_that_ships_has_its_hash_and_recipe(self):
+        shipped = {
+            path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in (ROOT / "assets" / "checkpoints").glob("*.safetensors")
+        }
+        stated = re.findall(r"^([0-9a-f]{64})  assets/checkpoints/(.+)$", self.PAGE, re.MULTILINE)
+        assert {name: digest for digest, name in stated} == shipped
+        for name in shipped:
+            [row] = re.findall(rf"^\| `{name.removesuffix('.safetensors')}` \|.*", self.PAGE, re.MULTILINE)
+            assert COMMAND.search(row) or "(agents/" in row
+
+    def test_the_options_of_its_scripts_exist(self):
+        for line in self.PAGE.replace("\\\n", " ").splitlines():
+            if line.startswith("python docs/"):
+                _, script, *words = shlex.split(line, comments=True)
+                source = (ROOT / script).read_text(encoding="utf-8")
+                assert all(f'"{word}"' in source for word in words if word.startswith("--")), line
 
 
 @pytest.mark.parametrize("page", DOCS)

@@ -51,6 +51,7 @@ PAGES = (
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
     *(f"docs/environments/{name}.md" for name in (*STANDING, "doors", "local", "hierarchical")),
+    "docs/reproduce.md",  # the last one, since it lists the tables of the others
 )
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
@@ -211,7 +212,7 @@ def with_tables(page: str, text: str, kept: Kept) -> str:
 
     A table is one of `TABLES`, or one of the report of the suite `paper`, as "paper local-13 spl".
     """
-    commands = os.path.relpath("docs/protocol.md", pathlib.PurePath(page).parent) + "#records"
+    commands = os.path.relpath("docs/reproduce.md", pathlib.PurePath(page).parent) + "#commands"
 
     def make(block: re.Match[str]) -> str:
         name, *of_report = block[2].split()
@@ -222,6 +223,33 @@ def with_tables(page: str, text: str, kept: Kept) -> str:
         return f"{block[1]}{table}{source}{block[3]}"
 
     return _BLOCK.sub(make, text)
+
+
+def published(_: Kept) -> str:
+    """Returns the tables of all other pages, with the archives of each and the time that they take to make again.
+
+    The times are those of the rows of docs/reproduce.md that begin with an archive.
+    """
+    costs = re.findall(
+        r"^\| `([\w/-]+)` \|.*\| (\d+) \| (\d+) \|$", (ROOT / PAGES[-1]).read_text("utf-8"), re.MULTILINE
+    )
+    minutes = {name: (int(evaluation), int(training)) for name, evaluation, training in costs}
+    rows = []
+    for page in PAGES[:-1]:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        for block in _BLOCK.finditer(text):
+            first, titles = text.partition("\n")[0], re.findall(r"^##+ (.+)$", text[: block.start()], re.MULTILINE)
+            section = titles[-1] if titles else first.removeprefix("# ")
+            place = ": ".join([first.removeprefix("# "), *titles[-1:]])
+            slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", section.lower()))
+            is_on_site = page.startswith("docs/")
+            place = f"[{place}]({page.removeprefix('docs/')}#{slug})" if is_on_site else f"{page}: {section}"
+            archives = re.findall(r"`([^`]+)`(?=.* \(\[commands)", block[0].rpartition(f"\n{_SOURCE}")[2])
+            parts = [minutes[name] for name in archives if name in minutes]
+            times = [str(sum(each)) for each in zip(*parts, strict=True)] if parts else ["", ""]
+            names = ", ".join(f"`{name}`" for name in archives) or "none: made from `assets/real`"
+            rows.append([place, *times, names, f"`{block[2]}`"])
+    return format_table(["table", "evaluation, minutes", "training, minutes", "archives", "name in its page"], rows)
 
 
 def report_table(kept: Kept, name: str, metric: str) -> str:
@@ -549,6 +577,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-blocked": tracks_blocked,
     "tracks-recall": tracks_recall,
     "doors": doors,
+    "published": published,
     **{f"expected-{track}": functools.partial(expected_on_track, track) for track in STANDING},
     "expected-local": lambda kept: by_distance(
         "agent",
