@@ -58,10 +58,11 @@ class Panel(NamedTuple):
     is_curve: bool = False  # intervals are bands, or else bars, those of several agents beside one another
 
 
-def draw_table(table: Table, labels: Sequence[str]) -> Figure:
+def draw_table(table: Table, labels: Sequence[str], most_columns: int = 3) -> Figure:
     """Returns the curves of a table: success rate, on time by the first factor, and SPL.
 
-    SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours.
+    SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours,
+    and `most_columns` is the number of panels side by side, 1 for a phone.
     """
     is_printed = (table.values.source.eq("paper") & table.values.metric.eq(SPL_GRID.name)).any()
     metrics = [SPL_GRID if is_printed and metric is SPL else metric for metric in HEADLINE]
@@ -74,7 +75,7 @@ def draw_table(table: Table, labels: Sequence[str]) -> Figure:
         for metric in metrics
         if len(points := single[single.metric == metric.name])
     ]
-    return draw_panels(table.title, panels, labels)
+    return draw_panels(table.title, panels, labels, most_columns=most_columns)
 
 
 @mpl.rc_context(STYLE)
@@ -84,13 +85,14 @@ def draw_panels(
     labels: Sequence[str],
     y_name: str = "",
     names: Mapping[str, str] | None = None,
+    most_columns: int = 3,
 ) -> Figure:
     """Returns panels in a grid, the title above, and one legend below them.
 
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
     some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
-    figure, grid, num_columns = make_grid(title, [panel.title for panel in panels], _HEIGHT)
+    figure, grid, num_columns = make_grid(title, [panel.title for panel in panels], _HEIGHT, most_columns)
     for axes, panel in zip(grid, panels, strict=True):
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
@@ -101,7 +103,7 @@ def draw_panels(
         return figure
     handles = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     lines = [name.split("\n") for name in handles]
-    columns = int(np.clip(13 * WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
+    columns = int(np.clip(13 * figure.get_figwidth() / (max(len(line) for each in lines for line in each) + 7), 1, 6))
     # The legend makes the figure higher, and leaves the panels as they are.
     figure.set_figheight(figure.get_figheight() + 0.16 * -(-len(lines) // columns) * max(map(len, lines)))
     figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns)
@@ -125,9 +127,11 @@ def to_svg(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes], int]:
+def make_grid(
+    title: str, titles: Sequence[str], height: float, most_columns: int = 3
+) -> tuple[Figure, list[Axes], int]:
     """Returns a figure, axes in it with these titles, as many beside one another as fit, and how many that is."""
-    num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
+    num_columns = min(len(titles), most_columns, 2 if len(titles) == 4 else 3)
     num_rows = -(-len(titles) // num_columns)
     width = WIDTH if num_columns > 1 else WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]
@@ -178,6 +182,11 @@ def set_ticks(axes: Axes, ticks: Mapping[float, str]) -> None:
     """Shows at most eight of the ticks, so that their texts do not meet."""
     shown = list(ticks)[:: -(-len(ticks) // 8)]
     axes.set_xticks(shown, [ticks[x] for x in shown])
+
+
+def color_of(label: str, labels: Sequence[str]) -> str:
+    """Returns the colour of an agent in the figures."""
+    return str(_look(label, labels)["color"])
 
 
 def _look(label: str, labels: Sequence[str]) -> dict[str, Any]:

@@ -43,6 +43,7 @@ class Drawn(NamedTuple):
     note: str
     figure: Figure
     values: pd.DataFrame
+    narrow: Figure | None = None  # the same for a phone, with its panels below one another
 
 
 @mpl.rc_context(STYLE)
@@ -58,19 +59,25 @@ def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
         agents = list(at_common_distances(group).groupby("label", observed=True))
         strength_name = perturbation.replace("_", " ")
         title = f"SPL by {strength_name}: {group.task.iloc[0]}"
-        figure, grid, _ = make_grid(title, [label for label, _ in agents], 2.1)
-        values = []
-        for axes, (label, own) in zip(grid, agents, strict=True):
-            levels, groups = zip(*own.groupby("strength").spl, strict=True)
-            scores, places = [each.to_numpy() for each in groups], range(len(levels))
-            axes.violinplot(scores, places, widths=0.8, points=50, showmeans=True, showextrema=False)
-            set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
-            axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
-            values.append(own.groupby("strength").spl.describe().drop(columns="std").assign(agent=label))
+        wide, narrow = (_draw_violins(title, strength_name, agents, most_columns) for most_columns in (3, 1))
+        values = [own.groupby("strength").spl.describe().drop(columns="std").assign(agent=label) for label, own in agents]
         table = pd.concat(values).set_index("agent", append=True).swaplevel().reset_index().round(4)
         note = f"{note_on_levels(perturbation, group)} Dashes: means."
-        figures.append(Drawn(f"violins-{name}", title, note, figure, table.astype({"count": int})))
+        figures.append(Drawn(f"violins-{name}", title, note, wide, table.astype({"count": int}), narrow))
     return figures
+
+
+def _draw_violins(
+    title: str, strength_name: str, agents: Sequence[tuple[str, pd.DataFrame]], most_columns: int
+) -> Figure:
+    figure, grid, _ = make_grid(title, [label for label, _ in agents], 2.1, most_columns)
+    for axes, (_, own) in zip(grid, agents, strict=True):
+        levels, groups = zip(*own.groupby("strength").spl, strict=True)
+        scores, places = [each.to_numpy() for each in groups], range(len(levels))
+        axes.violinplot(scores, places, widths=0.8, points=50, showmeans=True, showextrema=False)
+        set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
+        axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
+    return figure
 
 
 def draw_paths(episodes: pd.DataFrame) -> list[Drawn]:
