@@ -231,6 +231,16 @@ class TestResume:
         evaluate("random", out=tmp_path / "whole", record=True, **FEW)
         assert results_of(tmp_path / "out") == results_of(tmp_path / "whole")
 
+    @pytest.mark.parametrize(("record", "files"), [(None, RECORDED), (False, FILES)])
+    def test_few_episodes_are_recorded_unless_one_says_no(self, tmp_path, monkeypatch, record, files):
+        evaluate("random", out=tmp_path / "out", record=record, **FEW)
+        assert {path.name for path in (tmp_path / "out").iterdir()} == files
+        monkeypatch.setattr("mazebench.evaluation.evaluate.MOST_RECORDED", 39)
+        evaluate("random", out=tmp_path / "many", record=record, **FEW)
+        assert {path.name for path in (tmp_path / "many").iterdir()} == FILES
+        evaluate("random", out=tmp_path / "many", resume=True, **FEW)  # which has ended
+        assert {path.name for path in (tmp_path / "many").iterdir()} == FILES
+
 
 class TestOracle:
     """The oracle's steps, by which an episode is on time."""

@@ -16,7 +16,7 @@ from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk, Keep, poses_of
-from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard, eval_options
+from mazebench.evaluation.eval_options import MOST_RECORDED, WHOLE, EvalOptions, RunOptions, Shard, eval_options
 from mazebench.evaluation.measured_oracle import with_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, pool_of
@@ -122,9 +122,16 @@ def run_evaluation(
     if is_dry:
         return None
     with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
-        job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
+        by_default = out is not None and len(plan.trials) <= MOST_RECORDED
+        folder = out or pathlib.Path(temporary)
+        job = Job(plan, folder, is_recorded(run, folder, by_default), episodes)
         summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None
+
+
+def is_recorded(run: RunOptions, folder: pathlib.Path, by_default: bool) -> bool:
+    """Returns whether a run writes trajectories; by default not if it has finished without them."""
+    return by_default and not is_finished(folder) if run.record is None else run.record
 
 
 def say_cost(plans: Iterable[tuple[Plan, int]], is_dry: bool) -> None:

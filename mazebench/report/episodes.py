@@ -195,7 +195,8 @@ def reported(result: Result) -> ReportedResult:
         if summary.task.split_in_results != CUSTOM:
             raise InputError(f"{folder}: {error}") from error
         remark(f"{folder}: {error}; reported without mazes and paths")
-    fields = ("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "seed", "oracle_steps")
+    of_trials, outcomes = ("maze", "start", "goal", "distance", "seed", "oracle_steps"), ("success", "steps")
+    fields = (*of_trials, *outcomes, "path_length", "shortest_path")
     episodes = pd.DataFrame([[getattr(record, name) for name in fields] for record in records], columns=fields)
     episodes["distance"] = [record.asked_distance for record in records]
     facts = by_fact(records)

@@ -355,9 +355,14 @@ function play() {
   view.timer = requestAnimationFrame(frame);
 }
 
-// The table of results has the values of all metrics, of which it shows one, and rows of distances and groups.
+// The table of results has the values of all metrics, of which it shows one, in the columns that have some.
 function showMetric() {
+  const [head, ...rows] = byId("values").rows;
   for (const value of document.querySelectorAll("#values [data-metric]")) value.hidden = value.dataset.metric !== byId("metric").value;
+  for (let column = 1; column < head.cells.length; column++) {
+    const isEmpty = !rows.some((row) => row.cells[column].querySelector("[data-metric]:not([hidden])"));
+    for (const row of [head, ...rows]) row.cells[column].hidden = isEmpty;
+  }
 }
 
 function showFiner() {
@@ -394,6 +399,7 @@ function linkedBy(address) {
   return found && episode < (data.results[result] || { episodes: 0 }).episodes ? [result, episode, group] : null;
 }
 
+if (byId("values")) showMetric();
 const linked = linkedBy(location.hash);
 const [first, ...rest] = linked || linkedBy(data.opens) || [data.first];
 fill(byId("setting"), data.settings.map((name, setting) => [setting, name]), data.results[first].setting);

@@ -60,8 +60,8 @@ def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
         strength_name = perturbation.replace("_", " ")
         title = f"SPL by {strength_name}: {group.task.iloc[0]}"
         wide, narrow = (_draw_violins(title, strength_name, agents, most_columns) for most_columns in (3, 1))
-        values = [own.groupby("strength").spl.describe().drop(columns="std").assign(agent=label) for label, own in agents]
-        table = pd.concat(values).set_index("agent", append=True).swaplevel().reset_index().round(4)
+        spl = [own.groupby("strength").spl.describe().drop(columns="std").assign(agent=label) for label, own in agents]
+        table = pd.concat(spl).set_index("agent", append=True).swaplevel().reset_index().round(4)
         note = f"{note_on_levels(perturbation, group)} Dashes: means."
         figures.append(Drawn(f"violins-{name}", title, note, wide, table.astype({"count": int}), narrow))
     return figures

@@ -25,9 +25,7 @@ Rows = dict[str, pd.DataFrame]  # named groups of the episodes of all agents
 Printed = Mapping[str, Mapping[str, Mapping[str, float]]]  # the paper's values by agent, metric and row
 FINER = ": "  # between a setting and what is counted of it alone
 
-_DISTANCES_NOTE = (
-    "Where results cover different distances, only the distances that all of them cover count."
-)
+_DISTANCES_NOTE = "Where results cover different distances, only the distances that all of them cover count."
 _UNTRAINED_NOTE = "* The agent was never trained on maps of this scale."
 
 
@@ -149,7 +147,7 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
 
     # A table of all tracks, with a row for each track and level, and a table of each track and number of goals.
     rows, tables = {}, []
-    for name, track in TRACKS.items():
+    for name in TRACKS:
         for number, group in episodes[episodes.track == name].groupby("num_goals"):
             goals = f", {number} goals" if number > 1 else ""
             own = {str(level): at_common_distances(each) for level, each in group.groupby("level")}
@@ -163,15 +161,19 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
 
 
 def _track_note(episodes: pd.DataFrame) -> str:
-    """Returns what is imperfect in the episodes of a track; in buildings that are not the track's, as it was counted."""
+    """Returns what is imperfect in the episodes of a track; in other buildings than the track's, as it was counted."""
     setting, track = episodes.setting.iloc[0], TRACKS[episodes.track.iloc[0]]
     levels = dict(list(episodes.groupby("level")))
     if setting.mazes is None or "blocked" not in episodes:
         return " ".join([track.help, *(f"Level {level}: {track.levels[level - 1].meaning}." for level in levels)])
-    is_older = setting.shown not in (None, setting.mazes)
-    help_line = "The agents are shown an older map of each building." if is_older else track.help
-    counts = ", ".join(f"level {level}: {own.blocked.mean():.2f}" for level, own in levels.items())
-    return f"{help_line} The shortest path on the map is blocked in a share of the episodes ({counts})."
+    if setting.shown not in (None, setting.mazes):
+        lines = ["The agents are shown an older map of each building."]
+    else:
+        lines = ["Doors have moved since the map was drawn." if episodes.blocked.any() else "The map is right."]
+    if episodes.blocked.any():
+        counts = ", ".join(f"level {level}: {own.blocked.mean():.2f}" for level, own in levels.items())
+        lines.append(f"The shortest path on the map is blocked in a share of the episodes ({counts}).")
+    return " ".join(lines + ["The robot only has odometry."] * track.hides_pose)
 
 
 def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool = False) -> Table:

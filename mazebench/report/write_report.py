@@ -43,11 +43,8 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     episodes = join_episodes(results)
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
-    curves = [
-        Drawn(table.name, table.title, table.note, draw_table(table, labels), table.values, draw_table(table, labels, 1))
-        for table in tables
-        if table.x
-    ]
+    drawn_tables = [(table, *(draw_table(table, labels, columns) for columns in (3, 1))) for table in tables if table.x]
+    curves = [Drawn(each.name, each.title, each.note, wide, each.values, narrow) for each, wide, narrow in drawn_tables]
     of_paper = [*draw_violins(episodes), *draw_paths(episodes)]
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
