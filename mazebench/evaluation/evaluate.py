@@ -122,16 +122,11 @@ def run_evaluation(
     if is_dry:
         return None
     with pool_of(run, executor) as pool, tempfile.TemporaryDirectory() as temporary:
-        by_default = out is not None and len(plan.trials) <= MOST_RECORDED
-        folder = out or pathlib.Path(temporary)
-        job = Job(plan, folder, is_recorded(run, folder, by_default), episodes)
+        # Nobody reads the paths of a folder that is gone, and those of many episodes take room.
+        record = run.record if out and len(plan.trials) <= MOST_RECORDED else bool(run.record)
+        job = Job(plan, out or pathlib.Path(temporary), record, episodes)
         summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None
-
-
-def is_recorded(run: RunOptions, folder: pathlib.Path, by_default: bool) -> bool:
-    """Returns whether a run writes trajectories; by default not if it has finished without them."""
-    return by_default and not is_finished(folder) if run.record is None else run.record
 
 
 def say_cost(plans: Iterable[tuple[Plan, int]], is_dry: bool) -> None:
@@ -152,7 +147,7 @@ class Job:
 
     plan: Plan
     folder: pathlib.Path
-    record: bool
+    record: bool | None  # None: yes, unless it has begun without
     episodes: Sequence[int]  # by number; without any, nothing is written
     suite: str | None = None
     part: str | None = None
@@ -197,7 +192,7 @@ def run_jobs(
 
     def work(opened: contextlib.ExitStack) -> Iterator[tuple[int, Plan, Chunk]]:
         for index, job in enumerate(jobs):
-            if run.resume and is_finished(job.folder, job.record):
+            if run.resume and is_finished(job.folder, bool(job.record)):
                 check_same_run(job.folder, job.plan.identity)
                 summaries[index] = load_result(job.folder).summary
                 advance(len(job.episodes))

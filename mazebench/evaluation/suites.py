@@ -14,7 +14,7 @@ from typing import Any
 from mazebench.agent import Interface
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard
-from mazebench.evaluation.evaluate import Job, Progress, is_recorded, run_jobs, say_cost
+from mazebench.evaluation.evaluate import Job, Progress, run_jobs, say_cost
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.evaluation.pool import pool_of
 from mazebench.evaluation.store import check_same_run, is_finished
@@ -249,7 +249,7 @@ def run_suite(
             if episodes[key]:
                 plan = plans.pop(key) if key in plans else planned(agent_of[key[0]], parts[key[1]])
                 folder = out.joinpath(*key)
-                yield Job(plan, folder, is_recorded(run, folder, True), episodes[key], suite, key[1])
+                yield Job(plan, folder, run.record, episodes[key], suite, key[1])
 
     with pool_of(run, executor) as pool:
         make_folder(out)

@@ -14,6 +14,7 @@ from mazebench.report.episodes import ReportedResult, join_episodes, read_result
 from mazebench.report.figures import draw_table, save
 from mazebench.report.page import build_page
 from mazebench.report.paper_figures import Drawn, draw_paths, draw_violins
+from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.storage.files import make_folder, writing_to
 
@@ -43,8 +44,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     episodes = join_episodes(results)
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
-    drawn_tables = [(table, *(draw_table(table, labels, columns) for columns in (3, 1))) for table in tables if table.x]
-    curves = [Drawn(each.name, each.title, each.note, wide, each.values, narrow) for each, wide, narrow in drawn_tables]
+    curves = [_drawn(table, labels) for table in tables if table.x]
     of_paper = [*draw_violins(episodes), *draw_paths(episodes)]
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
@@ -62,6 +62,11 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
         page = build_page(results, head, tables[-1], (*curves, *of_paper), provenance_of(results), notes)
         (out / PAGE).write_bytes(page.encode(errors="replace"))  # names of folders need not be legal Unicode
     return results
+
+
+def _drawn(table: Table, labels: Sequence[str]) -> Drawn:
+    wide, narrow = (draw_table(table, labels, most_columns) for most_columns in (3, 1))
+    return Drawn(table.name, table.title, table.note, wide, table.values, narrow)
 
 
 @contextlib.contextmanager
