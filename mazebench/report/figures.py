@@ -58,11 +58,10 @@ class Panel(NamedTuple):
     is_curve: bool = False  # intervals are bands, or else bars, those of several agents beside one another
 
 
-def draw_table(table: Table, labels: Sequence[str], most_columns: int = 3) -> Figure:
+def draw_table(table: Table, labels: Sequence[str]) -> Figure:
     """Returns the curves of a table: success rate, on time by the first factor, and SPL.
 
-    SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours,
-    and `most_columns` is the number of panels side by side, 1 for a phone.
+    SPL is by grid distance where the paper's SPL stands beside it. `labels` are all agents', in the order of colours.
     """
     is_printed = (table.values.source.eq("paper") & table.values.metric.eq(SPL_GRID.name)).any()
     metrics = [SPL_GRID if is_printed and metric is SPL else metric for metric in HEADLINE]
@@ -75,7 +74,7 @@ def draw_table(table: Table, labels: Sequence[str], most_columns: int = 3) -> Fi
         for metric in metrics
         if len(points := single[single.metric == metric.name])
     ]
-    return draw_panels(table.title, panels, labels, most_columns=most_columns)
+    return draw_panels(table.title, panels, labels)
 
 
 @mpl.rc_context(STYLE)
@@ -85,14 +84,13 @@ def draw_panels(
     labels: Sequence[str],
     y_name: str = "",
     names: Mapping[str, str] | None = None,
-    most_columns: int = 3,
 ) -> Figure:
     """Returns panels in a grid, the title above, and one legend below them.
 
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
     some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
-    figure, grid, num_columns = make_grid(title, [panel.title for panel in panels], _HEIGHT, most_columns)
+    figure, grid, num_columns = make_grid(title, [panel.title for panel in panels], _HEIGHT)
     for axes, panel in zip(grid, panels, strict=True):
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
@@ -103,7 +101,7 @@ def draw_panels(
         return figure
     handles = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     lines = [name.split("\n") for name in handles]
-    columns = int(np.clip(13 * figure.get_figwidth() / (max(len(line) for each in lines for line in each) + 7), 1, 6))
+    columns = int(np.clip(13 * WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
     # The legend makes the figure higher, and leaves the panels as they are.
     figure.set_figheight(figure.get_figheight() + 0.16 * -(-len(lines) // columns) * max(map(len, lines)))
     figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns)
@@ -127,11 +125,9 @@ def to_svg(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def make_grid(
-    title: str, titles: Sequence[str], height: float, most_columns: int = 3
-) -> tuple[Figure, list[Axes], int]:
+def make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes], int]:
     """Returns a figure, axes in it with these titles, as many beside one another as fit, and how many that is."""
-    num_columns = min(len(titles), most_columns, 2 if len(titles) == 4 else 3)
+    num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
     num_rows = -(-len(titles) // num_columns)
     width = WIDTH if num_columns > 1 else WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]
@@ -141,6 +137,28 @@ def make_grid(
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     grid = [figure.add_subplot(num_rows, num_columns, place, title=text) for place, text in enumerate(titles, 1)]
     return figure, grid, num_columns
+
+
+@mpl.rc_context(STYLE)
+def stack(figure: Figure) -> Figure:
+    """Lays the panels of a figure below one another, as a phone shows them, and returns the figure."""
+    panels = figure.axes
+    specs = panels[0].get_subplotspec()
+    height = figure.get_figheight() / (specs.get_gridspec().nrows if specs else 1)
+    figure.set_layout_engine("constrained")  # again, where it has been saved
+    figure.set_size_inches(WIDTH / 1.6, height * len(panels))
+    figure.suptitle(textwrap.fill(figure.get_suptitle(), int(13 * WIDTH / 1.6)), fontsize=10, x=0.01, ha="left")
+    for axes, spec in zip(panels, figure.add_gridspec(len(panels), 1), strict=True):
+        axes.set_subplotspec(spec)
+    for legend in list(figure.legends):
+        handles, labels = (
+            [each for each in legend.legend_handles if each],
+            [text.get_text() for text in legend.get_texts()],
+        )
+        legend.remove()
+        columns = int(np.clip(13 * WIDTH / 1.6 / (max(map(len, labels)) + 7), 1, 3))
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+    return figure
 
 
 def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:

@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
 from mazebench.report.episodes import ReportedResult
-from mazebench.report.figures import color_of, to_svg
+from mazebench.report.figures import color_of, stack, to_svg
 from mazebench.report.paper_figures import TIME_COLORS, Drawn
 from mazebench.report.table import Table
 from mazebench.report.tables import FINER
@@ -56,7 +56,7 @@ def build_page(
     `head` describes the results in a line, and `table` has all their settings.
     """
     labels = list(dict.fromkeys(result.label for result in results))
-    images = [(each, as_svg(each.figure), each.narrow and as_svg(each.narrow)) for each in figures]
+    images = [(each, as_svg(each.figure), as_svg(stack(each.figure)) if each.stacks else "") for each in figures]
     is_printed = table.values.source.eq("paper").any()
     citation = "{authors}, {title}. {note}".format_map(reference()) if is_printed else ""
     told: dict[str, Any] = {"subtitle": head, "warnings": warnings, "citation": citation, "figures": images}

@@ -43,7 +43,7 @@ class Drawn(NamedTuple):
     note: str
     figure: Figure
     values: pd.DataFrame
-    narrow: Figure | None = None  # the same for a phone, with its panels below one another
+    stacks: bool = True  # its panels can stand below one another
 
 
 @mpl.rc_context(STYLE)
@@ -59,25 +59,19 @@ def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
         agents = list(at_common_distances(group).groupby("label", observed=True))
         strength_name = perturbation.replace("_", " ")
         title = f"SPL by {strength_name}: {group.task.iloc[0]}"
-        wide, narrow = (_draw_violins(title, strength_name, agents, most_columns) for most_columns in (3, 1))
-        spl = [own.groupby("strength").spl.describe().drop(columns="std").assign(agent=label) for label, own in agents]
-        table = pd.concat(spl).set_index("agent", append=True).swaplevel().reset_index().round(4)
+        figure, grid, _ = make_grid(title, [label for label, _ in agents], 2.1)
+        values = []
+        for axes, (label, own) in zip(grid, agents, strict=True):
+            levels, groups = zip(*own.groupby("strength").spl, strict=True)
+            scores, places = [each.to_numpy() for each in groups], range(len(levels))
+            axes.violinplot(scores, places, widths=0.8, points=50, showmeans=True, showextrema=False)
+            set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
+            axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
+            values.append(own.groupby("strength").spl.describe().drop(columns="std").assign(agent=label))
+        table = pd.concat(values).set_index("agent", append=True).swaplevel().reset_index().round(4)
         note = f"{note_on_levels(perturbation, group)} Dashes: means."
-        figures.append(Drawn(f"violins-{name}", title, note, wide, table.astype({"count": int}), narrow))
+        figures.append(Drawn(f"violins-{name}", title, note, figure, table.astype({"count": int})))
     return figures
-
-
-def _draw_violins(
-    title: str, strength_name: str, agents: Sequence[tuple[str, pd.DataFrame]], most_columns: int
-) -> Figure:
-    figure, grid, _ = make_grid(title, [label for label, _ in agents], 2.1, most_columns)
-    for axes, (_, own) in zip(grid, agents, strict=True):
-        levels, groups = zip(*own.groupby("strength").spl, strict=True)
-        scores, places = [each.to_numpy() for each in groups], range(len(levels))
-        axes.violinplot(scores, places, widths=0.8, points=50, showmeans=True, showextrema=False)
-        set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
-        axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05), yticks=np.linspace(0, 1, 6))
-    return figure
 
 
 def draw_paths(episodes: pd.DataFrame) -> list[Drawn]:
@@ -118,7 +112,7 @@ def _paths(name: str, episodes: pd.DataFrame, first: Sequence[str]) -> list[Draw
     for axes, trial in zip(grid[0], trials, strict=True):
         axes.set_title(f"maze {found.maze[trial]}", fontsize=7.5, loc="center")
     values = shown[shown.trial.isin(trials)].sort_values(["trial", "label"])[_COLUMNS].round(3).reset_index(drop=True)
-    return [Drawn(f"paths-{name}", title, _NOTE, figure, values)]
+    return [Drawn(f"paths-{name}", title, _NOTE, figure, values, stacks=False)]
 
 
 def _from_half(shares: pd.Series) -> pd.Series:
