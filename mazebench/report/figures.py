@@ -148,8 +148,9 @@ def stack(figure: Figure) -> Figure:
     figure.set_layout_engine("constrained")  # again, where it has been saved
     figure.set_size_inches(WIDTH / 1.6, height * len(panels))
     figure.suptitle(textwrap.fill(figure.get_suptitle(), int(13 * WIDTH / 1.6)), fontsize=10, x=0.01, ha="left")
-    for axes, spec in zip(panels, figure.add_gridspec(len(panels), 1), strict=True):
-        axes.set_subplotspec(spec)
+    grid = figure.add_gridspec(len(panels), 1)
+    for place, axes in enumerate(panels):
+        axes.set_subplotspec(grid[place])
     for legend in list(figure.legends):
         handles, labels = (
             [each for each in legend.legend_handles if each],
