@@ -1,4 +1,7 @@
-"""Additions to mkdocs.yml: fields explained by comments or `Doc`, unbroken figures, widths of cells, the repository."""
+"""Additions to mkdocs.yml: explained fields, unbroken figures, widths of cells, the address of the repository.
+
+A figure that has a narrow form next to it, NAME-narrow.svg, is shown in that form on a phone.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ _SHAPE = re.compile(r"^\[[^\]]*\]")
 # 0.94 [0.89, 0.98]; 0.94 / 0.89 / -0.02; the level behind the name of a track.
 _FIGURES = re.compile(r"\d?\.\d+ \[[-+]?\d?\.\d+, [-+]?\d?\.\d+\]|\d?\.\d+(?: / [-+]?\d?\.\d+)+|</code> \d\b")
 _CELL = re.compile(r"<td([^>]*)>(.*?)</td>", re.DOTALL)
+_FIGURE = re.compile(r'<img [^>]*src="([^"]*/)?([^"/]+)\.svg"[^>]*>')
 _SHORT, _LONG = 24, 60  # letters of a cell that a phone shows on one line, and of one that needs some width
 
 
@@ -27,7 +31,16 @@ def on_config(config, **kwargs) -> None:
 
 def on_page_content(html: str, **kwargs) -> str:
     """A page with spaces that do not break in figures, and cells of tables that site.css can tell apart by length."""
-    return _CELL.sub(_sized_cell, _FIGURES.sub(lambda found: found[0].replace(" ", "\u00a0"), html))
+    html = _CELL.sub(_sized_cell, _FIGURES.sub(lambda found: found[0].replace(" ", "\u00a0"), html))
+    return _FIGURE.sub(_with_narrow, html)
+
+
+def _with_narrow(image: re.Match[str]) -> str:
+    name = f"{image[2]}-narrow.svg"
+    if not (pathlib.Path(__file__).parent / "images" / name).exists():
+        return image[0]
+    source = f'<source media="(max-width: 44em)" srcset="{image[1] or ""}{name}">'
+    return f"<picture>{source}{image[0]}</picture>"
 
 
 def _sized_cell(cell: re.Match[str]) -> str:

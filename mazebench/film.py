@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mazebench.agent_loading import load_agent_class
-from mazebench.constants import STEP_TIME
+from mazebench.constants import MAX_PIXELS, STEP_TIME
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions
@@ -35,7 +35,11 @@ from mazebench.tasks.trials import counting_option
 from mazebench.world.ray_casting import ahead_of, ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
 
-MAP = "map"
+MAP, _TOP = "map", "top"
+# What stands above each of several views; others are called by their names.
+_TITLES = {MAP: "shown map, driven path", LIDAR: "building, lidar, path", _TOP: "from above", "chase": "from behind"}
+_TITLE_SHARE = 0.07  # of a view's side, above it
+_AROUND = 0.02  # of the side of a maze, seen by the camera on top at each side of it
 _CODEC = "vp09"  # VP9, which browsers play
 _FRAMES_PER_SECOND = 1 / STEP_TIME  # one an agent step: the film runs in real time
 
@@ -187,7 +191,11 @@ class _Scene:
         self._path: list[np.ndarray] = []  # [2] m each
         self.record_position()
         names = tuple(view for view in self.views if view in CAMERAS and view not in self._task.options.sensors)
-        self._cameras = Cameras(self._task.standing, names, self.pixels, self._task.body) if names else None
+        self._walls = self._task.mazes[self.episode.maze].walls
+        rows, columns = _part_of_free(self._walls)
+        pixels = self.pixels * len(self._walls) // max(rows.stop - rows.start, columns.stop - columns.start)
+        pixels = min(pixels, MAX_PIXELS) if _TOP in names else self.pixels  # of what is cut out, as many are left
+        self._cameras = Cameras(self._task.standing, names, pixels, self._task.body) if names else None
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""
@@ -201,6 +209,8 @@ class _Scene:
         pictures, rules = {}, self.envs.rules
         if self._cameras is not None:
             pictures = self._cameras.take(rules.maze.item(), rules.pose[0], rules.marker[0])
+            if _TOP in pictures:
+                pictures[_TOP] = _cut_out(pictures[_TOP], self._walls, _AROUND)
         for view in set(self.views) - pictures.keys():
             if view == MAP:
                 picture = self._map()
@@ -208,9 +218,11 @@ class _Scene:
                 picture = self._rays(observation[LIDAR][0])
             else:
                 picture = as_colors(view, observation[view][0])
-            way = cv2.INTER_NEAREST if len(picture) < self.pixels else cv2.INTER_AREA
-            pictures[view] = cv2.resize(picture, (self.pixels, self.pixels), interpolation=way)
-        return np.concatenate([pictures[view] for view in self.views], axis=1)
+            pictures[view] = picture
+        fitted = {view: _fitted(pictures[view], self.pixels) for view in self.views}
+        if len(fitted) == 1:
+            return fitted[self.views[0]]
+        return np.concatenate([_titled(picture, _TITLES.get(view, view)) for view, picture in fitted.items()], axis=1)
 
     def close(self) -> None:
         if self._cameras is not None:
@@ -224,7 +236,7 @@ class _Scene:
         pixels = (shown.seen_cell(cell) for cell in (self.episode.start, self.episode.goal))
         start, goal = ((row * side // size, column * side // size) for row, column in pixels)
         path = shown.seen_points(self._to_cells(self._path)) * (side / size)
-        return draw_grid(walls, self._cell_pixels(walls), start, goal, path)
+        return _cut_out(draw_grid(walls, self._cell_pixels(walls), start, goal, path), walls)
 
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
         """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
@@ -233,13 +245,56 @@ class _Scene:
         picture = draw_grid(walls, cell_pixels, self.episode.start, self.episode.goal, self._to_cells(self._path))
         sensor = ahead_of(pose, self._task.body.lidar_offset)
         draw_rays(picture, cell_pixels, self._to_cells(sensor[:2]), self._to_cells(ray_ends(sensor, ranges)))
-        return picture
+        return _cut_out(picture, self._walls)
 
     def _to_cells(self, points: ArrayLike) -> np.ndarray:  # [..., 2] m
         return np.asarray(points) / self._task.cell_size
 
     def _cell_pixels(self, walls: np.ndarray) -> int:
         return 2 * self.pixels // len(walls) + 1
+
+
+def _part_of_free(walls: np.ndarray) -> tuple[slice, slice]:
+    """Returns the rows and columns of a map that have free cells, with the walls around them."""
+    ends = (np.flatnonzero((walls < 0.5).any(axis=axis))[[0, -1]] for axis in (1, 0))
+    rows, columns = (slice(max(first - 1, 0), last + 2) for first, last in ends)
+    return rows, columns
+
+
+def _cut_out(picture: np.ndarray, walls: np.ndarray, around: float = 0.0) -> np.ndarray:
+    """Returns the part of a square picture that shows what is free on a map; `around` is the map's share on each side.
+
+    A picture of a map that is free up to its border stays as it is.
+    """
+    part = _part_of_free(walls)
+    if all(each.stop - each.start >= len(walls) for each in part):
+        return picture
+    scale = len(picture) / (1 + 2 * around)
+    place = (np.array([[each.start, each.stop] for each in part]) / len(walls) + around) * scale
+    rows, columns = (slice(*each) for each in np.rint(place).astype(int).tolist())
+    return picture[rows, columns]
+
+
+def _fitted(picture: np.ndarray, pixels: int) -> np.ndarray:
+    """Returns a picture in the middle of a white square with sides of `pixels`."""
+    scale = pixels / max(picture.shape[:2])
+    height, width = (max(1, round(side * scale)) for side in picture.shape[:2])
+    way = cv2.INTER_NEAREST if scale > 1 else cv2.INTER_AREA
+    square = np.full((pixels, pixels, 3), 255, dtype=np.uint8)
+    top, left = (pixels - height) // 2, (pixels - width) // 2
+    square[top : top + height, left : left + width] = cv2.resize(picture, (width, height), interpolation=way)
+    return square
+
+
+def _titled(picture: np.ndarray, title: str) -> np.ndarray:
+    """Returns a picture with a title above it, and a white line at its sides."""
+    pixels = len(picture)
+    height = 2 * round(pixels * _TITLE_SHARE / 2)  # films have even sides
+    line = np.full((height, pixels, 3), 255, dtype=np.uint8)
+    place = (round(0.02 * pixels), round(0.7 * height))
+    cv2.putText(line, title, place, cv2.FONT_HERSHEY_SIMPLEX, pixels / 600, (28, 33, 39), 1, cv2.LINE_AA)
+    picture[:, [0, -1]] = 255
+    return np.concatenate([line, picture])
 
 
 def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:

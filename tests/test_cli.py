@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import typer
 from processes import run_python
-from run_folders import FILES, IMPORTS, files_of, records_of, summary_of
+from run_folders import IMPORTS, RECORDED, files_of, records_of, summary_of
 
 from mazebench import __version__, cli
 from mazebench.agent_loading import agent_names
@@ -190,7 +190,7 @@ class TestEval:
         assert "random, local: 40 of 40 episodes\n" in errors  # plain lines where there is no terminal
         assert "resuming" not in output
         assert output.endswith("results in run\n")
-        assert {path.name for path in (tmp_path / "run").iterdir()} == FILES
+        assert {path.name for path in (tmp_path / "run").iterdir()} == RECORDED
 
     def test_a_run_without_out_gets_a_folder_of_its_own(self, command, tmp_path):
         for _ in range(2):
@@ -304,6 +304,6 @@ class TestRender:
             pytest.skip("no EGL here")
         assert (run.returncode, run.stderr) == (0, "")
         picture = cv2.imread(str(tmp_path / "x.png"))
-        assert picture.shape == (96, 4 * 96, 3)
+        assert picture.shape == (96 + 6, 4 * 96, 3)  # with titles
         views = np.split(picture, 4, axis=1)  # map, top, chase, egocentric
         assert all(view.std() > 5 for view in views)

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from acting import inputs_of
-from run_folders import FILES, files_of, records_of
+from run_folders import RECORDED, files_of, records_of
 
 from mazebench.agent import Agent
 from mazebench.errors import InputError
@@ -166,7 +166,7 @@ class TestEvaluation:
         evaluate_at_hand(name, "out")
         good, found = ([each | {"agent": ""} for each in records_of(tmp_path / out)] for out in ("good", "out"))
         assert found == good
-        assert set(files_of(tmp_path / "out")) == FILES
+        assert set(files_of(tmp_path / "out")) == RECORDED
 
     @pytest.mark.parametrize(
         ("declared", "value", "said"),
@@ -186,7 +186,7 @@ class TestEvaluation:
     def test_a_folder_without_episodes_can_be_used_again(self, tmp_path):
         with pytest.raises(AgentError):
             evaluate_at_hand("Divides", tmp_path / "out", record=True)
-        assert evaluate_at_hand("Good", tmp_path / "out").episodes == 20
+        assert evaluate_at_hand("Good", tmp_path / "out", record=False).episodes == 20
         assert not (tmp_path / "out" / "trajectories.npz").exists()
 
 

@@ -68,7 +68,7 @@ class Witness(Agent):
 class TestResults:
     def test_the_summary_tells_what_was_run_and_what_came_of_it(self, planner_run):
         summary = summary_of(planner_run)
-        assert {path.name for path in planner_run.iterdir()} == FILES
+        assert {path.name for path in planner_run.iterdir()} == RECORDED
         assert (summary["agent"], summary["benchmark"], summary["episodes"]) == ("planner", "paper", 40)
         assert Task.from_json(summary["task"]) == resolve_for_evaluation(TaskOptions(distances=FEW["distances"]))
         assert list(summary["by_distance"]) == ["1", "2"]
@@ -203,7 +203,7 @@ class TestResume:
                 size = journal.seek(0, os.SEEK_END)
                 journal.truncate(max(0, size - int(rng.integers(500))))
         evaluate("random", out=tmp_path, resume=True, **FEW)
-        assert {path.name for path in tmp_path.iterdir()} == FILES
+        assert {path.name for path in tmp_path.iterdir()} == RECORDED
         assert results_of(tmp_path) == results_of(random_run)
         assert summary_of(tmp_path)["overall"] == summary_of(random_run)["overall"]
 
@@ -222,14 +222,24 @@ class TestResume:
         assert results_of(out) == results_of(tmp_path / "whole")
         assert {path.name for path in out.iterdir()} == RECORDED
 
-    def test_trajectories_that_are_wanted_later_are_recorded(self, random_run, tmp_path):
-        shutil.copytree(random_run, tmp_path / "out")
+    def test_trajectories_that_are_wanted_later_are_recorded(self, tmp_path):
         out = tmp_path / "out"
+        evaluate("random", out=out, record=False, **FEW)
         with pytest.raises(Killed):
             evaluate("random", out=out, resume=True, record=True, num_envs=3, progress=kill_after(5), **FEW)
         evaluate("random", out=tmp_path / "out", resume=True, record=True, **FEW)
         evaluate("random", out=tmp_path / "whole", record=True, **FEW)
         assert results_of(tmp_path / "out") == results_of(tmp_path / "whole")
+
+    @pytest.mark.parametrize(("record", "files"), [(None, RECORDED), (False, FILES)])
+    def test_few_episodes_are_recorded_unless_one_says_no(self, tmp_path, monkeypatch, record, files):
+        evaluate("random", out=tmp_path / "out", record=record, **FEW)
+        assert {path.name for path in (tmp_path / "out").iterdir()} == files
+        monkeypatch.setattr("mazebench.evaluation.evaluate.MOST_RECORDED", 39)
+        evaluate("random", out=tmp_path / "many", record=record, **FEW)
+        assert {path.name for path in (tmp_path / "many").iterdir()} == FILES
+        evaluate("random", out=tmp_path / "many", resume=True, **FEW)  # which has ended
+        assert {path.name for path in (tmp_path / "many").iterdir()} == FILES
 
 
 class TestOracle:

@@ -166,7 +166,80 @@ class TestTracks:
         assert on_tracks.run("document.documentElement.scrollWidth") <= 360
 
 
+VALUES = "[...document.querySelectorAll('#values tr')].filter(row => row.checkVisibility()).map(row => row.innerText)"
+# The contrast of two colours of the style, as WCAG 2 defines it.
+CONTRAST = """
+    (() => {
+      const part = (byte) => (byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
+      const light = (name) => [1, 3, 5].map((at) => part(parseInt(colors()(name).slice(at, at + 2), 16)))
+        .reduce((sum, value, index) => sum + value * [0.2126, 0.7152, 0.0722][index], 0.05);
+      const [one, other] = [light("%s"), light("%s")];
+      return Math.max(one, other) / Math.min(one, other);
+    })()"""
+
+
+class TestTable:
+    def test_the_chosen_metric_of_each_setting_and_agent_is_shown_with_its_interval(self, on_tracks):
+        rows = on_tracks.run(VALUES)
+        assert [row.split("\t")[0] for row in rows] == [
+            "setting",
+            "local, 13 × 13",
+            "rebuilt, level 1, 31 × 31",
+            "adrift, level 1, 31 × 31",
+            "adrift, level 2, 31 × 31",
+            "rough, level 1, 31 × 31",
+        ]
+        assert re.fullmatch(r"local, 13 × 13(\s+\d\.\d\d \d\.\d\d–\d\.\d\d){2}", rows[1].strip())
+        on_tracks.run(set_value("metric", 3))
+        assert on_tracks.run(VALUES)[1] != rows[1]
+        bars = on_tracks.run("[...document.querySelectorAll('#values i')].filter(bar => bar.checkVisibility()).length")
+        assert bars == 10
+
+    def test_distances_and_groups_fold_out(self, on_tracks):
+        few = len(on_tracks.run(VALUES))
+        on_tracks.run("document.getElementById('finer').click()")
+        rows = [row.split("\t")[0] for row in on_tracks.run(VALUES)]
+        assert len(rows) > few
+        assert {"distance 2", "blocked", "not blocked"} <= set(rows)
+
+    def test_a_phone_keeps_the_settings_in_view(self, on_tracks):
+        on_tracks.resize(360, 800)
+        on_tracks.wait_for("document.documentElement.clientWidth === 360")
+        on_tracks.run(set_value("metric", 0))  # with a column of the paper's
+        on_tracks.run("document.querySelector('.scroll').scrollLeft = 200")
+        box = "document.querySelector('#values tbody {}').getBoundingClientRect().{}"
+        assert on_tracks.run(box.format("td", "left")) < on_tracks.run(box.format("th", "right")) - 20
+        assert on_tracks.run(box.format("th", "left")) >= 0
+        assert on_tracks.run("document.querySelector('.drawn img').currentSrc") in on_tracks.run(
+            "[...document.querySelectorAll('.drawn source')].map(node => node.srcset)"
+        )
+
+
 class TestReading:
+    def test_it_opens_on_the_worst_of_the_best_agent(self, on_tracks):
+        texts = on_tracks.run("[...document.getElementById('episodes').options].map(o => o.text)")
+        order = [("✗ failed", "✓ late", "✓ on time").index(text.split(" · ")[0]) for text in texts]
+        assert (order[0], order) == (0, sorted(order))
+        assert on_tracks.run("document.getElementById('episodes').selectedIndex") == 0
+        assert on_tracks.run("data.results[view.result].label") == "mah"
+
+    def test_what_is_late_is_told_of_all_agents(self, opened):
+        opened.wait_for("document.getElementById('others').tBodies[0].rows.length === 3")
+        cells = opened.run(
+            "[...document.getElementById('others').tBodies[0].rows].map(row => row.innerText.split('\\t'))"
+        )
+        assert all(re.fullmatch(r"✗ failed|✓ late|✓ on time", outcome.strip()) for _, outcome, *_ in cells)
+        for _, _, steps, of_oracle, _ in cells:
+            oracle = opened.run("view.current.oracle")
+            assert of_oracle.strip() == f"{int(steps) / oracle:.2f} ×"
+
+    @pytest.mark.parametrize("scheme", ["light", "dark"])
+    def test_where_map_and_maze_differ_is_seen(self, opened, scheme):
+        opened.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        assert opened.run(CONTRAST % ("lost-wall", "wall")) > 3
+        assert opened.run(CONTRAST % ("false-wall", "floor")) > 3
+        opened.call("Emulation.setEmulatedMedia", features=[])
+
     def test_the_slider_and_the_arrow_keys_move_through_time(self, opened):
         last = int(opened.run("document.getElementById('time').max"))
         assert last > 20
@@ -202,6 +275,7 @@ class TestReading:
         choose_setting(opened, "noise 0.5")
         opened.wait_for("document.getElementById('clock').value === 'no path recorded'")
         assert opened.run("document.getElementById('time').disabled")
+        assert opened.run("view.current.shown.some(wall => wall) && view.current.shown.length === 169")
 
     def test_the_same_episode_of_another_agent_is_one_click_away(self, opened):
         opened.wait_for("document.getElementById('others').tBodies[0].rows.length === 3")

@@ -20,7 +20,7 @@ from benchmarks.results.kept import RECALL, RECALL_AGENTS, RECALL_SETTINGS, keep
 from benchmarks.results.results_figures import figures
 from benchmarks.results.results_tables import PAGES, RECORDS, ROOT, with_tables
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.report.figures import to_svg
+from mazebench.report.figures import stack, to_svg
 
 match sys.argv[1:]:
     case []:
@@ -29,6 +29,8 @@ match sys.argv[1:]:
             (ROOT / page).write_bytes(with_tables(page, (ROOT / page).read_text("utf-8"), kept).encode())
         for name, figure in figures(kept).items():
             (ROOT / f"docs/images/{name}.svg").write_bytes(to_svg(figure))
+            if not name.startswith("paths"):  # whose panels are a grid
+                (ROOT / f"docs/images/{name}-narrow.svg").write_bytes(to_svg(stack(figure)))
     case ["keep", *folders]:
         for folder in folders:
             path = keep(pathlib.Path(folder), RECORDS)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mazebench.tasks.trials import Trial
 
 EPISODES = ("episodes_per_distance", "episodes_per_maze")  # fields that say how many episodes there are
+MOST_RECORDED = 200  # episodes of which trajectories are written unless one says so
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 
 
@@ -84,7 +85,10 @@ class RunOptions(Options):
     """
 
     resume: Annotated[bool, Doc("Go on with the run in --out.")] = False
-    record: Annotated[bool | None, Doc("Write trajectories too; a suite does by default.")] = None
+    record: Annotated[
+        bool | None,
+        Doc(f"Write trajectories too; by default, suites do, and so do evaluations of up to {MOST_RECORDED} episodes."),
+    ] = None
     num_envs: Annotated[int, Ge(1), Doc("Environments side by side in each process, at most.")] = NUM_ENVS
     workers: Annotated[int, Ge(0), Doc("Processes; 0 runs in this one.")] = 0
     cluster: Annotated[

@@ -16,7 +16,7 @@ from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk, Keep, poses_of
-from mazebench.evaluation.eval_options import WHOLE, EvalOptions, RunOptions, Shard, eval_options
+from mazebench.evaluation.eval_options import MOST_RECORDED, WHOLE, EvalOptions, RunOptions, Shard, eval_options
 from mazebench.evaluation.measured_oracle import with_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, pool_of
@@ -124,7 +124,9 @@ def run_evaluation(
     if is_dry:
         return None
     with pool_of(run, executor, pool) as pool, tempfile.TemporaryDirectory() as temporary:
-        job = Job(plan, out or pathlib.Path(temporary), bool(run.record), episodes)
+        # Nobody reads the paths of a folder that is gone, and those of many episodes take room.
+        record = run.record if out and len(plan.trials) <= MOST_RECORDED else bool(run.record)
+        job = Job(plan, out or pathlib.Path(temporary), record, episodes)
         summaries = run_jobs([job], 1, len(episodes), pool, run, progress, summing)
     return summaries[0] if summaries else None
 
@@ -147,7 +149,7 @@ class Job:
 
     plan: Plan
     folder: pathlib.Path
-    record: bool
+    record: bool | None  # None: yes, unless it has begun without
     episodes: Sequence[int]  # by number; without any, nothing is written
     suite: str | None = None
     part: str | None = None
@@ -192,7 +194,7 @@ def run_jobs(
 
     def work(opened: contextlib.ExitStack) -> Iterator[tuple[int, Plan, Chunk]]:
         for index, job in enumerate(jobs):
-            if run.resume and is_finished(job.folder, job.record):
+            if run.resume and is_finished(job.folder, bool(job.record)):
                 check_same_run(job.folder, job.plan.identity)
                 summaries[index] = load_result(job.folder).summary
                 advance(len(job.episodes))

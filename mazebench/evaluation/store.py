@@ -77,10 +77,11 @@ def write_results(
 class Store:
     """The episodes that have ended of one evaluation, on disk and in memory; a context manager."""
 
-    def __init__(self, folder: pathlib.Path, plan: Plan, *, resume: bool, record: bool):
+    def __init__(self, folder: pathlib.Path, plan: Plan, *, resume: bool, record: bool | None):
         """Makes the folder ready and reads what has ended.
 
-        A run that began with trajectories goes on with them, whatever `record` says.
+        A run that began with trajectories goes on with them, whatever `record` says. None records a run that begins,
+        and goes on as it began.
 
         Raises:
           InputError: if the folder can't be written, or holds another run or anything else.
@@ -100,7 +101,7 @@ class Store:
         if self._is_new and lines:
             raise InputError(f"{folder}: expected {CONFIG} of the run in {JOURNAL}, found none; name another folder")
         ended = [self._read(line) for line in lines]
-        self.record = record or any(trajectory for _, trajectory in ended)
+        self.record = any(trajectory for _, trajectory in ended) or (not ended if record is None else record)
         # By episode and leg; an episode whose last legs a kill cut off is run again.
         whole = {each.episode for each, _ in ended if each.leg == self._num_legs}
         self._ended = {

@@ -270,8 +270,7 @@ def run_suite(
             if episodes[key]:
                 plan = plans.pop(key) if key in plans else planned(agent_of[key[0]], parts[key[1]])
                 folder = out.joinpath(*key)
-                record = not is_finished(folder) if run.record is None else run.record
-                yield Job(plan, folder, record, episodes[key], suite, key[1])
+                yield Job(plan, folder, run.record, episodes[key], suite, key[1])
 
     with pool_of(run, executor, pool) as pool:
         make_folder(out)

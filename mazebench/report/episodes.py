@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -36,6 +36,7 @@ class ReportedResult:
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
     task: Task | None  # None if its mazes are gone
     trajectories: list[Trajectory] | None  # None if none were recorded, or the task is not known
+    maps: dict[Hashable, list[Shown]] = dataclasses.field(default_factory=dict)  # that results of equal trials share
 
     @property
     def run(self) -> str:
@@ -45,12 +46,15 @@ class ReportedResult:
 
     @functools.cached_property
     def shown(self) -> list[Shown]:
-        """The map shown to the agent in each episode of a result with paths or perturbations; empty for others."""
-        if self.task is None or not (self.trajectories or self.setting.active_perturbations):
+        """The map shown to the agent in each episode; empty if the task is not known."""
+        if self.task is None:
             return []
         indices = {maze.name: index for index, maze in enumerate(self.task.arena.fixed_mazes)}
         legs = list(zip(*(self.episodes[name] for name in ("maze", "start", "goal", "seed")), strict=True))
-        shown = []
+        key = self.summary.task, self.summary.provenance.mazes_sha256, tuple(legs)
+        if key in self.maps:
+            return self.maps[key]
+        shown = self.maps.setdefault(key, [])
         for number, (maze, *ends, seed) in enumerate(legs):
             _, start, goal, _ = legs[number - number % self.setting.num_goals]  # of the episode
             shown.append(shown_of(self.task, Episode(indices[maze], start, goal, 0.0, seed), ends))
@@ -73,13 +77,13 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     Raises:
       InputError: if there is no result.
     """
-    results = []
+    results, maps = [], dict[Hashable, list[Shown]]()
     for path in paths:
         if not _find_evaluations([path]):
             remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
     for folder in _find_evaluations(paths):
         try:
-            results.append(reported(load_result(folder)))
+            results.append(dataclasses.replace(reported(load_result(folder)), maps=maps))
         except InputError as error:
             remark(f"{error}; skipped")
     if not results:
@@ -191,7 +195,8 @@ def reported(result: Result) -> ReportedResult:
         if summary.task.split_in_results != CUSTOM:
             raise InputError(f"{folder}: {error}") from error
         remark(f"{folder}: {error}; reported without mazes and paths")
-    fields = ("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "seed")
+    of_trials, outcomes = ("maze", "start", "goal", "distance", "seed", "oracle_steps"), ("success", "steps")
+    fields = (*of_trials, *outcomes, "path_length", "shortest_path")
     episodes = pd.DataFrame([[getattr(record, name) for name in fields] for record in records], columns=fields)
     episodes["distance"] = [record.asked_distance for record in records]
     facts = by_fact(records)

@@ -2,7 +2,7 @@
 // The episode explorer. Text from results goes through textContent. A result's episodes and paths are packed and unpacked only when picked.
 
 const MAX_LISTED = 2000;
-const OF_EPISODES = ["start", "goal", "distance", "success", "steps", "driven", "shortest", "spl", "splGrid", "seed"];
+const OF_EPISODES = ["start", "goal", "distance", "success", "onTime", "steps", "oracle", "driven", "shortest", "spl", "splGrid", "seed"];
 const data = JSON.parse(document.getElementById("data").textContent);
 
 function element(tag, attributes = {}, ...children) {
@@ -128,6 +128,18 @@ async function openResult(number, episode = null, group = null) {
   listEpisodes(episode);
 }
 
+// Failures come first, the nearest goal before others, and then what took longest by the oracle's steps.
+function worstFirst({ success, steps, oracle, shortest }) {
+  const rank = (index) => (success[index] ? -steps[index] / (oracle[index] || Infinity) : shortest[index] - 1e9);
+  return (one, other) => rank(one) - rank(other) || one - other;
+}
+
+function verdictOf({ success, onTime }, index) {
+  return !success[index] ? "✗ failed" : onTime[index] ? "✓ on time" : "✓ late";
+}
+
+const timesOracle = (steps, oracle) => (oracle ? `${(steps / oracle).toFixed(2)} ×` : "");
+
 function listed() {
   const { columns } = view.packed;
   const [maze, distance, group] = ["maze", "distance", "group"].map((id) => byId(id).value);
@@ -140,11 +152,11 @@ function listed() {
 }
 
 function listEpisodes(episode) {
-  const found = listed();
   const { columns } = view.packed;
+  const found = listed().sort(worstFirst(columns));
   const result = data.results[view.result];
   const text = (index) =>
-    `${columns.success[index] ? "✓" : "✗"} ${index} · ${data.mazes[result.mazes[columns.maze[index]]].name} · ${inUnit(columns.distance[index])} · ${columns.steps[index]} steps`;
+    `${verdictOf(columns, index)} · ${index} · ${data.mazes[result.mazes[columns.maze[index]]].name} · ${inUnit(columns.distance[index])} · ${columns.steps[index]} steps`;
   const shown = found.slice(0, MAX_LISTED);
   const total = columns.success.length;
   const more = found.length > shown.length ? `, the first ${shown.length} listed` : "";
@@ -185,7 +197,7 @@ function openEpisode(index) {
 
 function writeOutcome() {
   const { current } = view;
-  const verdict = element("strong", { class: current.success ? "reached" : "failed" }, current.success ? "reached the goal" : "did not reach the goal");
+  const verdict = element("strong", { class: current.success ? "reached" : "failed" }, current.success ? `reached the goal ${current.onTime ? "on time" : "late"}` : "did not reach the goal");
   byId("outcome").replaceChildren(data.results[view.result].label, " ", verdict, ` in maze ${current.maze}, ${current.steps} steps, ${current.driven.toFixed(2)} m driven.`);
 }
 
@@ -196,14 +208,15 @@ function writeNumbers() {
     ["episode", String(view.episode)],
     ["from", cell(current.start)],
     ["to", cell(current.goal)],
-    ["distance", inUnit(current.distance)],
+    ["grid distance", inUnit(current.distance)],
     ["shortest path", `${current.shortest.toFixed(2)} m`],
     ["driven", `${current.driven.toFixed(2)} m`],
     ["time", `${current.steps} steps, ${(current.steps * data.units.step).toFixed(1)} s`],
+    ["oracle's time", current.oracle ? `${current.oracle} steps, of which this is ${timesOracle(current.steps, current.oracle)}` : "does not arrive"],
     ["SPL", current.spl.toFixed(2)],
     ["SPL by grid distance", current.splGrid.toFixed(2)],
     ["seed", String(current.seed)],
-    ...current.groups.map((group) => ["group", group]),
+    ...(current.groups.length ? [["groups", current.groups.join(", ")]] : []),
   ];
   byId("numbers").tBodies[0].replaceChildren(
     ...rows.map(([name, value]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", { class: "number" }, value))),
@@ -224,7 +237,7 @@ async function writeOthers() {
     const button = element("button", { type: "button", class: "link" }, data.results[number].label);
     if (number === result) button.setAttribute("aria-current", "true");
     button.addEventListener("click", () => openResult(number, index));
-    const texts = [columns.success[index] ? "✓ reached" : "✗ failed", String(columns.steps[index]), columns.spl[index].toFixed(2)];
+    const texts = [verdictOf(columns, index), String(columns.steps[index]), timesOracle(columns.steps[index], columns.oracle[index]), columns.spl[index].toFixed(2)];
     rows.push(element("tr", {}, element("td", {}, button), ...texts.map((text) => element("td", { class: "number" }, text))));
   }
   byId("others").tBodies[0].replaceChildren(...rows);
@@ -300,7 +313,7 @@ function describe() {
   const shown = data.results[view.result].hidden ? "The map, which was hidden from the agent" : "The map that the agent was shown";
   byId("shown-caption").textContent = current.shown ? shown : "The map that the agent was shown was not recorded";
   byId("driven-caption").textContent = !current.path.x.length
-    ? "The maze; the path was not recorded (eval --record)"
+    ? "The maze. The path was not recorded, which eval --record does"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
   byId("shown").setAttribute("aria-label", `Map of ${current.side} by ${current.side} pixels as shown to the agent`);
   byId("driven").setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
@@ -342,6 +355,20 @@ function play() {
   view.timer = requestAnimationFrame(frame);
 }
 
+// The table of results has the values of all metrics, of which it shows one, in the columns that have some.
+function showMetric() {
+  const [head, ...rows] = byId("values").rows;
+  for (const value of document.querySelectorAll("#values [data-metric]")) value.hidden = value.dataset.metric !== byId("metric").value;
+  for (let column = 1; column < head.cells.length; column++) {
+    const isEmpty = !rows.some((row) => row.cells[column].querySelector("[data-metric]:not([hidden])"));
+    for (const row of [head, ...rows]) row.cells[column].hidden = isEmpty;
+  }
+}
+
+function showFiner() {
+  for (const row of document.querySelectorAll("#values .finer")) row.hidden = !byId("finer").checked;
+}
+
 function listen() {
   const on = (id, event, action) => byId(id).addEventListener(event, action);
   on("setting", "change", () => {
@@ -359,6 +386,8 @@ function listen() {
   });
   on("play", "click", play);
   on("lidar", "change", draw);
+  if (byId("values")) on("metric", "change", showMetric);
+  if (byId("finer")) on("finer", "change", showFiner);
   new ResizeObserver(draw).observe(byId("driven"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
@@ -370,6 +399,7 @@ function linkedBy(address) {
   return found && episode < (data.results[result] || { episodes: 0 }).episodes ? [result, episode, group] : null;
 }
 
+if (byId("values")) showMetric();
 const linked = linkedBy(location.hash);
 const [first, ...rest] = linked || linkedBy(data.opens) || [data.first];
 fill(byId("setting"), data.settings.map((name, setting) => [setting, name]), data.results[first].setting);

@@ -139,6 +139,29 @@ def make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure,
     return figure, grid, num_columns
 
 
+@mpl.rc_context(STYLE)
+def stack(figure: Figure) -> Figure:
+    """Lays the panels of a figure below one another, as a phone shows them, and returns the figure."""
+    panels = figure.axes
+    specs = panels[0].get_subplotspec()
+    height = figure.get_figheight() / (specs.get_gridspec().nrows if specs else 1)
+    figure.set_layout_engine("constrained")  # again, where it has been saved
+    figure.set_size_inches(WIDTH / 1.6, height * len(panels))
+    figure.suptitle(textwrap.fill(figure.get_suptitle(), int(13 * WIDTH / 1.6)), fontsize=10, x=0.01, ha="left")
+    grid = figure.add_gridspec(len(panels), 1)
+    for place, axes in enumerate(panels):
+        axes.set_subplotspec(grid[place])
+    for legend in list(figure.legends):
+        handles, labels = (
+            [each for each in legend.legend_handles if each],
+            [text.get_text() for text in legend.get_texts()],
+        )
+        legend.remove()
+        columns = int(np.clip(13 * WIDTH / 1.6 / (max(map(len, labels)) + 7), 1, 3))
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+    return figure
+
+
 def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:
     points, ticks = panel.points, list(panel.ticks)
     ours = [label for label in labels if label in set(points.column)]
@@ -178,6 +201,11 @@ def set_ticks(axes: Axes, ticks: Mapping[float, str]) -> None:
     """Shows at most eight of the ticks, so that their texts do not meet."""
     shown = list(ticks)[:: -(-len(ticks) // 8)]
     axes.set_xticks(shown, [ticks[x] for x in shown])
+
+
+def color_of(label: str, labels: Sequence[str]) -> str:
+    """Returns the colour of an agent in the figures."""
+    return str(_look(label, labels)["color"])
 
 
 def _look(label: str, labels: Sequence[str]) -> dict[str, Any]:

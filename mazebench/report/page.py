@@ -6,12 +6,13 @@ explorer.js and canvas.js replay episodes.
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 import itertools
 import json
 import math
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -24,10 +25,12 @@ from matplotlib.figure import Figure
 from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
 from mazebench.report.episodes import ReportedResult
-from mazebench.report.figures import to_svg
+from mazebench.report.figures import color_of, stack, to_svg
 from mazebench.report.paper_figures import TIME_COLORS, Drawn
 from mazebench.report.table import Table
+from mazebench.report.tables import FINER
 from mazebench.results import naming
+from mazebench.results.metrics import METRICS, ON_TIMES
 from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode, schedule_of
@@ -37,31 +40,47 @@ from mazebench.world.ray_casting import NUM_RAYS
 
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
+ON_TIME = ON_TIMES[0].name  # the column of episodes that says which are on time
 
 
 def build_page(
     results: Sequence[ReportedResult],
     head: str,
-    tables: Sequence[Table],
-    figures: Mapping[str, Figure],
-    of_paper: Sequence[Drawn],
+    table: Table,
+    figures: Sequence[Drawn],
     provenance: pd.DataFrame,
     warnings: Sequence[str],
 ) -> str:
     """Returns the page as HTML; text from results is escaped in it, or stands in it as JSON and base64.
 
-    `head` describes the results in a line. `figures` are those of tables, by their names, and `of_paper` others.
+    `head` describes the results in a line, and `table` has all their settings.
     """
-    # Tables with their figures, the other figures, then tables without one. Each has a title, a note and values.
-    drawn = [(table, figures[table.name]) for table in tables if table.name in figures]
-    sections: list[tuple[Table | Drawn, str, Iterable[pd.DataFrame]]] = [
-        (table, as_svg(figure), map(table.wide, table.metrics)) for table, figure in drawn
-    ]
-    sections += [(each, as_svg(each.figure), [each.values]) for each in of_paper]
-    sections += [(table, "", map(table.wide, table.metrics)) for table in tables if table.name not in figures]
-    citation = "{authors}, {title}. {note}".format_map(reference())
-    told: dict[str, Any] = {"subtitle": head, "warnings": warnings, "citation": citation, "sections": sections}
-    return with_explorer("page.html", results, provenance, **told)
+    labels = list(dict.fromkeys(result.label for result in results))
+    images = [(each, as_svg(each.figure), as_svg(stack(each.figure)) if each.stacks else "") for each in figures]
+    is_printed = table.values.source.eq("paper").any()
+    citation = "{authors}, {title}. {note}".format_map(reference()) if is_printed else ""
+    told: dict[str, Any] = {"subtitle": head, "warnings": warnings, "citation": citation, "figures": images}
+    return with_explorer("page.html", results, provenance, **told, table=_cells(table, labels), note=table.note)
+
+
+def _cells(table: Table, labels: Sequence[str]) -> dict[str, Any]:
+    """Returns the content of a table as page.html shows it: agents with their colours, rows, and values by metric."""
+    values = {(line["row"], line["column"], line["metric"]): line for line in table.values.to_dict("records")}
+    columns, rows, setting = list(table.values.column.cat.categories), [], ""
+    for row in table.values.row.cat.categories:
+        is_finer = bool(setting) and row.startswith(setting + FINER)
+        setting = setting if is_finer else row
+        cells = [[values.get((row, column, metric)) for metric in table.metrics] for column in columns]
+        rows.append({"name": row.removeprefix(setting + FINER), "is_finer": is_finer, "cells": cells})
+    colors_of = {label: color_of(label, labels) for label in labels}
+    return {
+        "opens": table.metrics.index(ON_TIME),  # the metric that is shown first
+        "metrics": [METRICS[metric].title for metric in table.metrics],
+        "columns": [(column, colors_of.get(column, "")) for column in columns],
+        "rows": rows,
+        "has_finer": any(row["is_finer"] for row in rows),
+        "opens_finer": sum(not row["is_finer"] for row in rows) == 1,
+    }
 
 
 def with_explorer(
@@ -79,11 +98,11 @@ def with_explorer(
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
     columns: dict[str, int] = {}  # JSON, deflated, in base64, with their numbers
+    pack = functools.cache(lambda text: _base64(zlib.compress(text.encode("ascii"), 9)))
     used = []
     for result in results:
         parts = (json.dumps(each, separators=(",", ":")) for each in (_trials(result), _outcomes(result)))
-        packed = (_base64(zlib.compress(part.encode("ascii"), 9)) for part in parts)
-        used.append([columns.setdefault(each, len(columns)) for each in packed])
+        used.append([columns.setdefault(pack(part), len(columns)) for part in parts])
     templates = jinja2.Environment(loader=jinja2.PackageLoader("mazebench", "report"), autoescape=True)
     return templates.get_template(template).render(
         **told,
@@ -140,9 +159,13 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
                 "hidden": "map" in result.summary.task.hide,
             }
         )
-    # The explorer opens with a result that has paths, hierarchical if there is such a one.
+    # The explorer opens where the best of the agents that know no truth is late most often, of results with paths.
+    joined = pd.DataFrame([(each.label, *each.episodes[["success", ON_TIME]].mean()) for each in results])
+    rates = joined.groupby(0, sort=False)[1].mean()
+    on_time = dict(zip(results, joined[2], strict=True))
     first = min(
-        results, key=lambda each: (not each.trajectories, not each.setting.is_exact, not each.setting.is_hierarchical)
+        results,
+        key=lambda each: (not each.trajectories, each.summary.privileged, -rates[each.label], on_time[each]),
     )
     return {
         "settings": list(map(naming.described, settings)),
@@ -165,12 +188,12 @@ def _trials(result: ReportedResult) -> dict[str, Any]:
         "distance": episodes.distance.tolist(),
         "shortest": episodes.shortest_path.round(2).tolist(),
         "seed": episodes.seed.tolist(),
+        "oracle": [None if pd.isna(steps) else int(steps) for steps in episodes.oracle_steps],
         "groups": {fact: episodes[fact].astype(int).tolist() for fact in result.facts},
     }
     if maps := result.shown:
         columns["shownStart"] = [shown.start for shown in maps]
         columns["shownGoal"] = [shown.goal for shown in maps]
-    if result.trajectories:
         columns["landmarks"] = [shown.landmarks for shown in maps]
         if not (result.setting.is_exact and maps[0].are_cells):
             pixels = (np.packbits(shown.walls) if shown.are_cells else shown.walls for shown in maps)
@@ -183,6 +206,7 @@ def _outcomes(result: ReportedResult) -> dict[str, Any]:
     episodes, trajectories = result.episodes, result.trajectories
     columns: dict[str, Any] = {
         "success": episodes.success.astype(int).tolist(),
+        "onTime": episodes[ON_TIME].astype(int).tolist(),
         "steps": episodes.steps.tolist(),
         "driven": episodes.path_length.round(2).tolist(),
         "spl": episodes.spl.round(2).tolist(),

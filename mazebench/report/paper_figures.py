@@ -43,6 +43,7 @@ class Drawn(NamedTuple):
     note: str
     figure: Figure
     values: pd.DataFrame
+    stacks: bool = True  # its panels can stand below one another
 
 
 @mpl.rc_context(STYLE)
@@ -111,7 +112,7 @@ def _paths(name: str, episodes: pd.DataFrame, first: Sequence[str]) -> list[Draw
     for axes, trial in zip(grid[0], trials, strict=True):
         axes.set_title(f"maze {found.maze[trial]}", fontsize=7.5, loc="center")
     values = shown[shown.trial.isin(trials)].sort_values(["trial", "label"])[_COLUMNS].round(3).reset_index(drop=True)
-    return [Drawn(f"paths-{name}", title, _NOTE, figure, values)]
+    return [Drawn(f"paths-{name}", title, _NOTE, figure, values, stacks=False)]
 
 
 def _from_half(shares: pd.Series) -> pd.Series:

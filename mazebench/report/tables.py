@@ -22,11 +22,10 @@ from mazebench.tasks.tracks import TRACKS
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 Rows = dict[str, pd.DataFrame]  # named groups of the episodes of all agents
-Printed = Mapping[str, Mapping[str, Mapping[int, float]]]  # the paper's values by agent, metric and row
+Printed = Mapping[str, Mapping[str, Mapping[str, float]]]  # the paper's values by agent, metric and row
+FINER = ": "  # between a setting and what is counted of it alone
 
-_DISTANCES_NOTE = (
-    "Means over all episodes. If results cover different distances, only the distances that all of them cover count."
-)
+_DISTANCES_NOTE = "Where results cover different distances, only the distances that all of them cover count."
 _UNTRAINED_NOTE = "* The agent was never trained on maps of this scale."
 
 
@@ -38,13 +37,35 @@ def build_tables(episodes: pd.DataFrame) -> list[Table]:
             dataclasses.replace(table, name=f"{table.name}-mazes-{number}", title=f"{table.title}, {mazes}")
             for table in _tables_of(episodes[episodes.mazes == mazes])
         ]
+    return [*tables, _all_settings(episodes)]
+
+
+def _all_settings(episodes: pd.DataFrame) -> Table:
+    """Returns a table with a row for each setting, followed by its distances, or by the groups that a track tells."""
+    rows: Rows = {}
+    is_cut = False
+    paper: dict[str, dict[str, dict[str, float]]] = {}
     settings = list(episodes.groupby("setting", observed=True))
     names = Counter(described(setting) for setting, _ in settings)
-    rows = {
-        described(setting) + f", {group.mazes.iloc[0]}" * (names[described(setting)] > 1): at_common_distances(group)
-        for setting, group in settings
-    }
-    return [*tables, make_table("all", "All results", _DISTANCES_NOTE, "setting", rows)]
+    for setting, group in settings:
+        name = described(setting) + f", {group.mazes.iloc[0]}" * (names[described(setting)] > 1)
+        rows[name] = at_common_distances(group)
+        is_cut |= len(rows[name]) < len(group)
+        finer = {fact: group[group[fact]] for fact in facts_of(group)}
+        if setting.track is None and not setting.is_hierarchical:
+            finer = {f"distance {distance}": own for distance, own in group.groupby("distance")}
+        rows |= {f"{name}{FINER}{each}": own for each, own in finer.items() if len(own)}
+
+        # The paper prints local navigation by distance, on right and on warped maps, and routes by landmark distance.
+        perturbed = {each for each, _ in setting.active_perturbations}
+        is_printed = setting.track is None and perturbed <= {"map_warp"} and not (perturbed and setting.is_hierarchical)
+        task, own_row = group.task.iloc[0], {str(setting.landmark_distance): name}
+        for agent, metrics in (_printed(task, group, bool(perturbed)) if is_printed else {}).items():
+            for metric, values in metrics.items():
+                keys = own_row if setting.is_hierarchical else {at: f"{name}{FINER}distance {at}" for at in values}
+                found = paper.setdefault(agent, {}).setdefault(metric, {})
+                found |= {keys[at]: value for at, value in values.items() if at in keys}
+    return make_table("all", "All results", _DISTANCES_NOTE if is_cut else "", "setting", rows, paper)
 
 
 def make_table(name: str, title: str, note: str, row_name: str, rows: Rows, paper: Printed | None = None) -> Table:
@@ -68,8 +89,7 @@ def make_table(name: str, title: str, note: str, row_name: str, rows: Rows, pape
     for agent, metrics in (paper or {}).items():
         for metric, values in metrics.items():
             named = {"metric": metric, "column": f"{agent} (paper)", "source": "paper"}
-            known = (row for row in rows if row.isdigit() and int(row) in values)
-            lines += [named | {"row": row, "value": values[int(row)]} for row in known]
+            lines += [named | {"row": row, "value": values[row]} for row in rows if row in values]
     if any(line.get("mark") for line in lines):
         note = f"{note} {_UNTRAINED_NOTE}".strip()
     return Table(name, title, note, row_name, make_values(lines, rows))
@@ -127,20 +147,33 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
 
     # A table of all tracks, with a row for each track and level, and a table of each track and number of goals.
     rows, tables = {}, []
-    for name, track in TRACKS.items():
+    for name in TRACKS:
         for number, group in episodes[episodes.track == name].groupby("num_goals"):
             goals = f", {number} goals" if number > 1 else ""
             own = {str(level): at_common_distances(each) for level, each in group.groupby("level")}
-            meanings = "; ".join(f"{level}: {track.levels[int(level) - 1].meaning}" for level in own)
             of_facts = {f"{level}, {fact}": row[row[fact]] for level, row in own.items() for fact in facts_of(group)}
-            if group.mazes.str.startswith("mazes ").any():
-                meanings += "; in mazes of one's own, an older map of them is shown instead of moved doors"
-            note, file = f"{track.help} {meanings}.", f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}"
-            tables.append(make_table(file, f"Track {name}{goals}", note, "level", own | of_facts))
+            file = f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}"
+            tables.append(make_table(file, f"Track {name}{goals}", _track_note(group), "level", own | of_facts))
             rows |= {f"{name} {level}{goals}": row for level, row in own.items()}
     if rows:
         yield make_table("tracks", "Tracks", _DISTANCES_NOTE, "track and level", rows)
     yield from tables
+
+
+def _track_note(episodes: pd.DataFrame) -> str:
+    """Returns what is imperfect in the episodes of a track; in other buildings than the track's, as it was counted."""
+    setting, track = episodes.setting.iloc[0], TRACKS[episodes.track.iloc[0]]
+    levels = dict(list(episodes.groupby("level")))
+    if setting.mazes is None or "blocked" not in episodes:
+        return " ".join([track.help, *(f"Level {level}: {track.levels[level - 1].meaning}." for level in levels)])
+    if setting.shown not in (None, setting.mazes):
+        lines = ["The agents are shown an older map of each building."]
+    else:
+        lines = ["Doors have moved since the map was drawn." if episodes.blocked.any() else "The map is right."]
+    if episodes.blocked.any():
+        counts = ", ".join(f"level {level}: {own.blocked.mean():.2f}" for level, own in levels.items())
+        lines.append(f"The shortest path on the map is blocked in a share of the episodes ({counts}).")
+    return " ".join(lines + ["The robot only has odometry."] * track.hides_pose)
 
 
 def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool = False) -> Table:
@@ -155,7 +188,11 @@ def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool 
 
 def _printed(task: str, episodes: pd.DataFrame, is_warped: bool = False) -> Printed:
     """Returns the paper's values for the setting of some episodes; none for other mazes than the eval mazes."""
-    return {} if episodes.mazes.iloc[0] else printed(task, int(episodes["size"].iloc[0]), is_warped)
+    found = {} if episodes.mazes.iloc[0] else printed(task, int(episodes["size"].iloc[0]), is_warped)
+    return {
+        agent: {metric: {str(row): value for row, value in values.items()} for metric, values in metrics.items()}
+        for agent, metrics in found.items()
+    }
 
 
 def _rows_by(episodes: pd.DataFrame, column: str) -> Rows:

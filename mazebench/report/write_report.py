@@ -13,7 +13,7 @@ from mazebench.errors import InputError, one_line, remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
 from mazebench.report.figures import draw_table, save
 from mazebench.report.page import build_page
-from mazebench.report.paper_figures import draw_paths, draw_violins
+from mazebench.report.paper_figures import Drawn, draw_paths, draw_violins
 from mazebench.report.tables import build_tables
 from mazebench.storage.files import make_folder, writing_to
 
@@ -43,7 +43,8 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     episodes = join_episodes(results)
     labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
-    figures = {table.name: draw_table(table, labels) for table in tables if table.x}
+    drawn = [(each, draw_table(each, labels)) for each in tables if each.x]
+    curves = [Drawn(each.name, each.title, each.note, figure, each.values) for each, figure in drawn]
     of_paper = [*draw_violins(episodes), *draw_paths(episodes)]
     benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
     head = (
@@ -54,12 +55,11 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
         for table in tables:
             for suffix, text in table.to_files().items():
                 (out / TABLES / f"{table.name}{suffix}").write_bytes(text.encode(errors="replace"))
-        for name, figure in figures.items():
-            save(figure, out / FIGURES / name)
-        for drawn in of_paper:
-            save(drawn.figure, out / FIGURES / drawn.name)
-            drawn.values.to_csv(out / TABLES / f"{drawn.name}.csv", index=False)
-        page = build_page(results, head, tables, figures, of_paper, provenance_of(results), notes)
+        for each in (*curves, *of_paper):
+            save(each.figure, out / FIGURES / each.name)
+        for each in of_paper:
+            each.values.to_csv(out / TABLES / f"{each.name}.csv", index=False)
+        page = build_page(results, head, tables[-1], (*curves, *of_paper), provenance_of(results), notes)
         (out / PAGE).write_bytes(page.encode(errors="replace"))  # names of folders need not be legal Unicode
     return results
 

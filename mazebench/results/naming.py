@@ -8,7 +8,7 @@ from mazebench.maps.real_buildings import PREFIX, building_of, is_real
 from mazebench.options import fields_of
 from mazebench.tasks.sensors import CHOICES_OF_SENSORS, NOISE_OF_SENSORS, SENSORS
 from mazebench.tasks.task_options import ENDS, TaskOptions
-from mazebench.tasks.tracks import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.world.bodies import SLIDER
 
 # Options that an agent may choose, or is not told, while the same is played.
@@ -81,7 +81,7 @@ def order(options: TaskOptions) -> tuple[Any, ...]:
     """Returns the key by which tables sort options."""
     landmarks = options.landmark_distance if options.is_hierarchical else 0
     of_mazes = str(options.mazes or ""), str(options.shown or ""), options.kinds, options.num_mazes or 0
-    of_track = options.track or "", options.level or (), options.num_goals
+    of_track = list(TRACKS).index(options.track) if options.track else -1, options.level or (), options.num_goals
     kind = options.track is not None, options.is_hierarchical, options.size or 0, options.split_in_results
     return *kind, landmarks, options.active_perturbations, *of_mazes, *of_track, own_in_words(options)
 
