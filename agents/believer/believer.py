@@ -17,7 +17,7 @@ from ..robot.senses import Memory
 from .doors import DoorBelief, Drawn
 from .ways import FREE, UNKNOWN, WALL, drive, lines_of_sight, path_of
 
-_NUM_BUILDINGS = 32
+_NUM_BUILDINGS = 24
 _CRISP = 0.39  # difference from a half of the probability of a wall, in each cell of a map that is not drawn by hand
 _PLACED = 0.95  # probability of the way in which the map lies, from which that one is believed
 # The price of a door, in cells, by the probability p that it is closed: the larger one of these times -log(1 - p), and
