@@ -17,7 +17,7 @@ from ..common.u_net import UNet
 
 NAME = "map-changes"
 
-_CHANNELS = (24, 40, 56)  # of features at 1, 2 and 4 cells
+_CHANNELS = (16, 32, 48)  # of features at 1, 2 and 4 cells
 _MULTIPLE = 2 ** (len(_CHANNELS) - 1)  # of cells along an axis of the inputs
 
 
@@ -46,7 +46,7 @@ class ChangeNetwork(UNet):
     @torch.no_grad()
     def changes(self, shown: np.ndarray, seen_wall: np.ndarray, seen_free: np.ndarray) -> np.ndarray:
         """Returns `[N, N]` float: the probability that a cell differs from the map; the arguments are `[N, N]` bool."""
-        planes = (torch.from_numpy(np.ascontiguousarray(each))[None] for each in (shown, seen_wall, seen_free))
+        planes = torch.from_numpy(np.stack([shown, seen_wall, seen_free]))[:, None]
         return torch.sigmoid(self.log_odds(*planes))[0].double().numpy()
 
 

@@ -30,8 +30,8 @@ from ..common.symmetry import NUM_SYMMETRIES, turn_planes
 from .change_network import NAME, ChangeNetwork
 
 _SIZE = 31  # cells a side
-_BATCH = 32
-_NEW = 16  # maps per update, in the place of the oldest ones
+_BATCH = 16
+_NEW = 8  # maps per update, in the place of the oldest ones
 _FIRST = 512  # maps before the first update
 _NUM_KEPT = 8192  # maps that batches are taken from
 _SAME_MAZE = 4  # maps of a maze, one for each of these changes
@@ -39,7 +39,7 @@ _MOVED = (None, MovedDoors(45), MovedDoors(70), MovedDoors(85))
 _SIGHT = 3.5  # m
 _LONGEST = 300  # cells of a walk; the logs of their numbers are as likely as each other
 _UNSEEN = 0.1  # share of maps of which nothing was seen yet
-_REPORTED = 200  # updates
+_REPORTED = 100  # updates
 _SEED = 76_000  # of mazes in no split
 
 
@@ -119,7 +119,7 @@ def train(num_updates: int, seed: int) -> Iterator[tuple[int, float, ChangeNetwo
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     descent = Descent(
         network,
-        torch.optim.Adam(network.parameters(), 2e-3),
+        torch.optim.Adam(network.parameters(), 3e-3),
         max_gradient_norm=1.0,
         target_rate=0.005,
         rate=lambda update: min(1.0, update / 100) * cosine((update - 1) / num_updates),
@@ -140,7 +140,7 @@ def train(num_updates: int, seed: int) -> Iterator[tuple[int, float, ChangeNetwo
 
 @one_torch_thread()
 def main() -> None:
-    """Trains, and writes the network every minute or so."""
+    """Trains, and writes the network now and then."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--updates", type=int, default=6_000, help=f"of {_BATCH} maps each")
     parser.add_argument("--seed", type=int, default=0)
