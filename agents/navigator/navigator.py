@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface, Report
+from mazebench.maps.maze import Cell
 
 from ..robot.driving import Drive
 from ..robot.facing import TurningDrive
@@ -71,17 +72,14 @@ class Navigator(Agent):
             if inputs.active is None or inputs.active[slot]:
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
-                    robot = state[slot] = Robot(memory, self._passages(memory))
+                    robot = state[slot] = self.begin(memory, inputs.seed.item(slot))
                 elif robot.passages is not None:
                     robot.passages.update(memory)
 
                 # A path over walls and goal as they are estimated now.
                 walls, goal = self.estimate(memory, inputs, slot)
                 closed = None if robot.passages is None else robot.passages.costs(memory)
-                path = plan(walls, goal, memory.cell, self._cell_size, closed) if goal.any() else []
-                if closed is not None:  # as far as the first closed passage
-                    path = path[: int(np.argmax([closed[cell] < np.inf for cell in path] + [True]))]
-                    path = path if len(path) > 1 or goal[memory.cell] else []
+                path = self.find_path(robot, walls, goal, closed)
 
                 # It drives along the path, and waits where there is none.
                 if self._turns:
@@ -89,6 +87,22 @@ class Navigator(Agent):
                 else:
                     actions[slot] = robot.drive.follow(path, walls, memory, self._strafes)
         return velocities if self._turns else as_kind(self._kind, actions, self._body), state
+
+    def begin(self, memory: Memory, seed: int) -> Robot:
+        """Returns the robot of an episode, whose random draws come from `seed`."""
+        return Robot(memory, self._passages(memory))
+
+    def find_path(self, robot: Robot, walls: np.ndarray, goal: np.ndarray, closed: np.ndarray | None) -> list[Cell]:
+        """Returns the cells of the path from the robot's cell, none where it waits or knows no goal.
+
+        `walls` and `goal` are as in `estimate`, and `closed` the costs of closed passages, if some have changed.
+        """
+        cell = robot.memory.cell
+        path = plan(walls, goal, cell, self._cell_size, closed) if goal.any() else []
+        if closed is not None:  # as far as the first closed passage
+            path = path[: int(np.argmax([closed[each] < np.inf for each in path] + [True]))]
+            path = path if len(path) > 1 or goal[cell] else []
+        return path
 
     def _passages(self, memory: Memory) -> Passages | None:
         """Returns what a robot sees of passages; None where it does not wait for them, or its pose may be wrong."""

@@ -93,6 +93,13 @@ class MapBelief:
             self.log_weights[inside] += np.log(np.maximum(1 - here, _UNTOLD))
         return changed
 
+    def likeliest(self, least: float) -> tuple[int, int, int] | None:
+        """Returns the likeliest placement, as orientation, row and column; None if it is less than `least` probable."""
+        weights = self.weights
+        best = int(weights.argmax())
+        orientation, row, column = self.placements[best].tolist()
+        return (orientation, row, column) if weights[best] >= least else None
+
     def on_map(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
         """Returns a pose on the grid (cells, rad) as one on the map that is shown, by the likeliest hypothesis."""
         orientation, row, column = self.placements[self.log_weights.argmax()].tolist()

@@ -102,18 +102,20 @@ def swap_doors(
 
 
 @functools.lru_cache(maxsize=_NUM_KEPT)
-def _doors(walls: bytes, kind: str) -> _Doors:
+def _doors(walls: bytes, kind: str) -> DoorGraph:
     size = math.isqrt(len(walls))
-    return _Doors(Maze(np.frombuffer(walls, dtype=bool).reshape(size, size), kind=kind))
+    maze = Maze(np.frombuffer(walls, dtype=bool).reshape(size, size), kind=kind)
+    return DoorGraph(maze.walls, door_slots(maze))
 
 
-class _Doors:
+class DoorGraph:
     """The doors of a map, open or not, and the rooms that they join. `R` is the number of rooms and 1."""
 
-    def __init__(self, maze: Maze):
-        self.slots = door_slots(maze)
-        self.is_open = ~maze.walls[tuple(self.slots.T)]  # [D] bool
-        self._rooms = np.sort(rooms_beside(maze.walls, self.slots), axis=0)  # [2, D] int, from 1
+    def __init__(self, walls: np.ndarray, slots: np.ndarray):
+        """Takes `walls` `[N, N]` bool and their door slots `[D, 2]` int."""
+        self.slots = slots
+        self.is_open = ~walls[tuple(self.slots.T)]  # [D] bool
+        self._rooms = np.sort(rooms_beside(walls, self.slots), axis=0)  # [2, D] int, from 1
         num_rooms = int(self._rooms.max(initial=0)) + 1
         _, self._pair = np.unique(self._rooms.T @ (num_rooms, 1), return_inverse=True)  # [D] int, pair of rooms
 
@@ -130,7 +132,7 @@ class _Doors:
         num_open, num_closed = (np.bincount(types, each, num_types) for each in (self.is_open, ~self.is_open))
         self.odds = (num_open + 0.5) / (num_closed + 0.5)
 
-    def copy(self) -> _Doors:
+    def copy(self) -> DoorGraph:
         """Returns doors that may be swapped without a change of these."""
         copied = copy.copy(self)
         for name in ("is_open", "_num_open", "_num_between", "_ways"):
@@ -144,7 +146,7 @@ class _Doors:
         return (np.minimum(first, second) * (_MOST_DOORS + 1) + np.maximum(first, second)) * 2 + is_second
 
     def way_around(self, door: int) -> list[int]:
-        """Returns the open doors on a shortest way from one room of a closed door to the other."""
+        """Returns the open doors on a shortest way from one room of a closed door to the other; none if none leads."""
         start, goal = self._rooms[:, door].tolist()
         came_by = {start: (-1, start)}  # of each room that was seen: the door to it, and the room before
         queue = [start]
@@ -156,7 +158,7 @@ class _Doors:
             if goal in came_by:
                 break
         doors = []
-        room = goal
+        room = goal if goal in came_by else start
         while room != start:
             way, room = came_by[room]
             doors.append(way)
