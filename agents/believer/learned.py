@@ -10,12 +10,12 @@ import numpy as np
 
 from mazebench.agent import Inputs, Interface
 
+from ..navigator.navigator import Navigator
 from ..robot.change_network import NAME, ChangeNetwork, load
 from ..robot.occupancy import SURE
 from ..robot.senses import Memory
-from .navigator import Navigator
 
-_SURE = (0.005, 0.5)  # the least and the largest probability of a change; of two states, the shown one stays likelier
+_SURE = (0.005, 0.49)  # the least and the largest probability of a change; of two states, the shown one stays likelier
 _PRIOR_AREA = 1e9  # m^2: what was seen counts in the network alone
 
 
