@@ -25,7 +25,7 @@ from .dead_reckoning import DeadReckoning
 from .map_matching import MapBelief
 from .map_reading import guess_by, map_reader, read_map
 from .moving_body import LOOK_LEFT, LOOK_RIGHT, MovingBody, Point, observed_body
-from .occupancy import SURE, posterior, seen_walls
+from .occupancy import PRIOR_AREA, SURE, posterior, seen_walls
 from .tracking import Tracker, aligned
 
 _MARK_OFF = 1.0  # m, standard deviation of the goal from its marker, once it was not there
@@ -54,6 +54,8 @@ class Memory:
     commanded: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # the pose after the last action
     action: int = LOOK_LEFT  # the last one
     heading: float | None = None  # rad, with which the last action drives; None for the body's
+    prior_area: float = PRIOR_AREA  # m^2 of seen cells that weigh as much as the prior, see `posterior`
+    asked: np.ndarray | None = None  # [L, L] bool, the cells that were seen when the prior was last asked for
 
     def __post_init__(self) -> None:
         self.prior, self.goal = self.belief.mixture()
@@ -76,7 +78,7 @@ class Memory:
 
         The map counts as much as it has proved right. The goal is in no cell that was searched, nor in a seen wall.
         """
-        walls = posterior(self.prior, self.evidence, self.cell_size)
+        walls = posterior(self.prior, self.evidence, self.cell_size, self.prior_area)
         is_closed = (np.abs(self.evidence) >= SURE) & (walls > 0.5)
         is_possible = ~(self.searched | is_closed)
         goal = self.goal * is_possible

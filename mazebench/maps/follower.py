@@ -43,7 +43,7 @@ def follow(walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, sight: float
       sight: cells, how far the robot sees; at least 1.
       most: times the shortest way, where the robot ends its drive if it can't reach the goal within that.
     """
-    offsets, before = _sight_lines(sight)
+    offsets, before = sight_lines(sight)
     lines = np.stack([offsets @ (len(walls), 1), before], axis=1)
     window = np.ones((2 * offsets.max() + 1,) * 2)
     shown = np.pad(shown[1:-1, 1:-1], 1, constant_values=True)
@@ -52,7 +52,7 @@ def follow(walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, sight: float
     return Drives(cells, driven, shortest, boxes + offsets.max() * np.array([-1, 1, -1, 1]))
 
 
-def _sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
+def sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Returns the cells that are at most `reach` cells away, and the indices of those before them on lines of sight.
 
     The cells are rows and columns from the robot's cell (`[K, 2]` int), in an order in which those before come first.
@@ -77,7 +77,7 @@ def _follow(
     """Does the work of `follow`, with boxes of the cells that its searches have reached.
 
     Only from the cells of `can_be_wrong` (`[N * N]` bool) may the map look wrong. `lines` (`[K, 2]` int) are the steps
-    to the cells of `_sight_lines`, and the indices of those before.
+    to the cells of `sight_lines`, and the indices of those before.
     """
     size, true = len(walls), walls.ravel()
     driven, shortest = np.empty(len(pairs), np.int64), np.empty(len(pairs), np.int64)
