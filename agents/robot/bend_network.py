@@ -11,12 +11,12 @@ import pathlib
 import numpy as np
 import torch
 from scipy import ndimage
-from torch import nn
 from torch.nn import functional
 
 from ..common.actor import one_torch_thread
 from ..common.checkpoint import load_checkpoint, load_into
 from ..common.symmetry import NUM_SYMMETRIES, turn_planes
+from ..common.u_net import UNet
 from .drawn_map import GUESSED_SIZE as SIZE
 from .drawn_map import Guess, drawing_box
 
@@ -27,56 +27,30 @@ _CHANNELS = (24, 48, 72, 72)  # of features at 1, 2, 4 and 8 cells
 _SAMPLES = (np.arange(2 * len(PLACES)) + 0.5) / 2 - 0.5  # [64], cells, of its inputs along an axis; two for each output
 
 
-class _Block(nn.Module):
-    """Two convolutions with a way around them."""
-
-    def __init__(self, num_inputs: int, num_outputs: int):
-        super().__init__()
-        self.layers = nn.Sequential(
-            nn.Conv2d(num_inputs, num_outputs, 3, padding=1), nn.GroupNorm(4, num_outputs), nn.ReLU(),
-            nn.Conv2d(num_outputs, num_outputs, 3, padding=1), nn.GroupNorm(4, num_outputs),
-        )  # fmt: skip
-        self.around = nn.Conv2d(num_inputs, num_outputs, 1)
-
-    def forward(self, features: torch.Tensor) -> torch.Tensor:
-        return functional.relu(self.around(features) + self.layers(features))
-
-
-class BendNetwork(nn.Module):
+class BendNetwork(UNet):
     """A U-Net: features of 1, 2, 4 and 8 cells, and back."""
 
     places: torch.Tensor  # [1, 2, 32, 32]
 
     def __init__(self) -> None:
         """Makes a network with new weights."""
-        super().__init__()
-        first, *others = _CHANNELS
-        self.inputs = _Block(6, first)
-        self.down = nn.ModuleList(_Block(*pair) for pair in zip(_CHANNELS, others, strict=False))
-        self.up = nn.ModuleList(_Block(fine + coarse, fine) for fine, coarse in zip(_CHANNELS, others, strict=False))
-        self.outputs = nn.Conv2d(first, 4, 1)
+        super().__init__(6, _CHANNELS, 4)
         place = torch.linspace(-1, 1, len(PLACES))
         self.register_buffer("places", torch.stack(torch.meshgrid(place, place, indexing="ij"))[None], persistent=False)
 
-    def forward(self, drawings: torch.Tensor) -> torch.Tensor:
+    def guess(self, drawings: torch.Tensor) -> torch.Tensor:
         """Returns `[B, 2, 2, 32, 32]` of drawings `[B, 64, 64]`: displacements, and the logs of their scales.
 
         Both are along rows and along columns, in cells. A displacement has Laplace's distribution.
         """
         planes = functional.pixel_unshuffle(drawings[:, None], 2)
-        levels = [self.inputs(torch.cat([planes, self.places.expand(len(planes), -1, -1, -1)], dim=1))]
-        for block in self.down:
-            levels.append(block(functional.avg_pool2d(levels[-1], 2)))
-        features = levels.pop()
-        for block in reversed(self.up):
-            finer = functional.interpolate(features, scale_factor=2, mode="bilinear", align_corners=False)
-            features = block(torch.cat([finer, levels.pop()], dim=1))
-        bends, log_scales = self.outputs(features).split(2, dim=1)
+        found = self(torch.cat([planes, self.places.expand(len(planes), -1, -1, -1)], dim=1))
+        bends, log_scales = found.split(2, dim=1)
         return torch.stack([bends, log_scales.clamp(-5, 2)], dim=1)
 
     def loss(self, drawings: torch.Tensor, bends: torch.Tensor) -> torch.Tensor:
         """Returns the mean negative log likelihood of true displacements `[B, 2, 32, 32]`, less a constant."""
-        found, log_scales = self(drawings).unbind(1)
+        found, log_scales = self.guess(drawings).unbind(1)
         return ((found - bends).abs() * torch.exp(-log_scales) + log_scales).mean()
 
     @one_torch_thread()
@@ -84,7 +58,7 @@ class BendNetwork(nn.Module):
     def read(self, picture: np.ndarray) -> Guess:
         """Returns what it finds in a picture `[62, 62]`, on average over the eight ways in which this may lie."""
         drawing = torch.from_numpy(sampled(picture))
-        found = self(torch.stack([turn_planes(drawing, symmetry) for symmetry in range(NUM_SYMMETRIES)]))
+        found = self.guess(torch.stack([turn_planes(drawing, symmetry) for symmetry in range(NUM_SYMMETRIES)]))
         found[:, 1] = found[:, 1].exp()
         upright = torch.stack([turn_bends(each, _inverse(symmetry)) for symmetry, each in enumerate(found)])
         upright[:, 1] = upright[:, 1].abs()  # a turn has changed the signs of some

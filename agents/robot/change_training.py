@@ -142,14 +142,12 @@ def train(num_updates: int, seed: int) -> Iterator[tuple[int, float, ChangeNetwo
 def main() -> None:
     """Trains, and writes the network now and then."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--updates", type=int, default=6_000, help=f"of {_BATCH} maps each")
+    parser.add_argument("--updates", type=int, default=4_000, help=f"of {_BATCH} maps each")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="the file to write")
     options = parser.parse_args()
     for update, loss, network in train(options.updates, options.seed):
-        save_checkpoint(
-            options.out, network.state_dict(), {"agent": NAME, "seed": options.seed, "updates": update}
-        )
+        save_checkpoint(options.out, network.state_dict(), {"agent": NAME, "seed": options.seed, "updates": update})
         print(f"{update:,} updates, {time.process_time():.0f} s of CPU, loss {loss:.5f}", flush=True)
 
 
