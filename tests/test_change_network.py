@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mazebench_agents.believer.learned import LearnedBeliever
+from mazebench_agents.navigator import Navigator
 from mazebench_agents.robot import change_training
 from mazebench_agents.robot.change_network import load
 from mazebench_agents.robot.change_training import Walks, train
