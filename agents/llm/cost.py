@@ -1,4 +1,4 @@
-"""What questions may cost, before any is asked."""
+"""The cost of the questions of a run, estimated before any is asked."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ Each picture shows all that is around the robot, its left edge and its right edg
 
 
 class View(NamedTuple):
-    """What the robot's camera saw in a moment."""
+    """The view of the robot's camera in a moment."""
 
     picture: np.ndarray  # [H, W, 3] uint8 RGB
     step: int
@@ -91,7 +91,7 @@ class Situation(NamedTuple):
 
 
 class Question(NamedTuple):
-    """What is asked in a situation."""
+    """The question that is asked in a situation."""
 
     instruction: str  # the task and how to answer
     text: str

@@ -30,7 +30,7 @@ _LONGEST_MESSAGE = 4096  # bytes
 
 
 class _Message(pydantic.BaseModel):
-    """What a page sends."""
+    """A message of a page."""
 
     model_config = pydantic.ConfigDict(strict=True, extra="forbid")
 
