@@ -1,12 +1,10 @@
-"""Draws the pictures of README.md and docs from episodes: `MUJOCO_GL=egl python -m benchmarks.pictures`.
+"""Draws the pictures of README.md and docs from episodes: `python -m benchmarks.pictures`.
 
-The film is an episode of `navigator` in the dev mazes of `rebuilt` 2, in which the path on the map is blocked. All
-other episodes are in train mazes, or in mazes of no split.
+Episodes are in train mazes, or in mazes of no split. The films are made by `benchmarks.films`.
 """
 
 from __future__ import annotations
 
-import io
 import pathlib
 import re
 import shutil
@@ -16,6 +14,7 @@ import tempfile
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,16 +24,14 @@ from PIL import Image
 import mazebench
 from mazebench.agent import Inputs
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.evaluation.eval_options import eval_options
-from mazebench.evaluation.plan import make_plan
-from mazebench.film import run_episode
 from mazebench.maps import colors
 from mazebench.maps.benchmark import FROZEN_SPLITS, load_kind_mazes, load_mazes
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells, path_through_walls
-from mazebench.maps.pictures import draw_grid, draw_rays, write_image
+from mazebench.maps.pictures import draw_grid, draw_rays
 from mazebench.maps.real_buildings import PREFIX, RIGHT, YEARS, building_of, buildings, load_building, load_older
+from mazebench.report.figures import WIDTH
 from mazebench.report.page import lay_on_first_pose
 from mazebench.report.write_report import write_report
 from mazebench.results.played import Shown, shown_of
@@ -70,47 +67,6 @@ SEEN = 4  # likewise of the places in all looks
 STRIDE = 0.15  # m, of a drawn shortest path
 EXPLORED = 28  # the episode in the explorer
 CHECKED = "pal-office-7th-floor-changed-1"  # the real building whose old map is checked
-FILMED = 94  # the episode: the navigator finds a door closed and drives around
-VIEWS = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
-SIDE, GAP, TITLE, LEGEND = 256, 12, 32, 70  # pixels; three views and four gaps are 816 wide
-FRAME_TIME = 80  # ms: twice as fast as the robot
-
-
-def film() -> None:
-    """Films an episode in three views, with the path on the map and marks at the doors that have moved."""
-    plan = make_plan(eval_options("navigator", task="rebuilt", level=2, split="dev", seed=FILMED))
-    views = [run_episode(plan, FILMED, view, SIDE, is_film=True)[0] for view in VIEWS]
-    episode = plan.trials[FILMED].episode
-    maze, seen = plan.task.mazes[episode.maze], show_map(plan.task, episode)
-
-    # All frames have the same titles, marks and legend before them.
-    width, height = len(VIEWS) * (SIDE + GAP) + GAP, TITLE + SIDE + LEGEND
-    figure = Figure(figsize=(width / 100, height / 100))
-    places = [(GAP + index * (SIDE + GAP), TITLE) for index in range(len(VIEWS))]
-    panels = [figure.add_axes((x / width, LEGEND / height, SIDE / width, SIDE / height)) for x, _ in places]
-    for axes, title in zip(panels, VIEWS.values(), strict=True):
-        axes.set(xlim=(0, maze.size), ylim=(0, maze.size))
-        axes.set_title(title, fontsize=14)
-        axes.set_axis_off()
-    _annotate(*panels[:2], maze, seen, episode.start, episode.goal)
-    figure.savefig(file := io.BytesIO(), transparent=True)
-    marks = Image.open(file)
-    frames = []
-    for moment in zip(*views, strict=True):
-        frame = Image.new("RGB", (width, height), "white")
-        for place, picture in zip(places, moment, strict=True):
-            frame.paste(Image.fromarray(picture), place)
-        frame.paste(marks, mask=marks)
-        frames.append(frame)
-
-    # One palette for all frames, so that what stands still is stored once.
-    shades = [MOVED, PLANNED, MIDWAY, colors.to_hex(colors.START), colors.to_hex(colors.GOAL)]
-    swatches = np.array([[list(bytes.fromhex(shade[1:]))] for shade in shades * 40], dtype=np.uint8)
-    some = [np.asarray(frame) for frame in frames[:: len(frames) // 6]]
-    palette = Image.fromarray(np.concatenate([*some, np.repeat(swatches, width, axis=1)])).quantize(110)
-    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    durations = [FRAME_TIME] * len(rest) + [2000]
-    first.save(FOLDER / "rebuilt.gif", save_all=True, append_images=rest, duration=durations, loop=0, optimize=True)
 
 
 def draw_environments() -> None:
@@ -130,10 +86,12 @@ def draw_environments() -> None:
         )
         if played.observed is not None:
             on_maze.plot(*played.observed[:, :2].T, "--", color=ODOMETRY, lw=2, label="path by odometry")
-        _annotate(on_map, on_maze, maze, played.seen, played.start, played.goal)
+        annotate(on_map, on_maze, maze, played.seen, played.start, played.goal)
+        add_legend(figure)
         figure.savefig(FOLDER / "environments" / f"{name}.png", dpi=100, metadata={"Software": None})
 
 
+@mpl.rc_context({"text.color": "#808080"})  # which is read on a white and on a dark page
 def draw_observation() -> None:
     """Draws what the agent observes in a moment of `rebuilt` 2, with a camera besides the lidar."""
     env = mazebench.make("rebuilt", level=2, sensors=("lidar", "egocentric"))
@@ -164,9 +122,9 @@ def draw_observation() -> None:
     groups = ("position x, y, z in m", "roll, pitch, yaw in rad", "velocity in m/s", "turning in rad/s")
     state = zip(groups, (observation["state"].reshape(4, 3) + 0.0).tolist(), strict=True)
     text = "\n\n".join(f"{group}\n" + "   ".join(f"{number:.2f}" for number in numbers) for group, numbers in state)
-    _show(last, np.ones((1, 1, 3)), "state: 12 numbers", 13, extent=(0, 1, 0, 1))
+    _show(last, np.zeros((1, 1, 4)), "state: 12 numbers", 13, extent=(0, 1, 0, 1))
     last.text(0, 0.98, text, fontsize=13, va="top", linespacing=1.2)
-    figure.savefig(FOLDER / "observation.png", dpi=100, metadata={"Software": None})
+    _save(figure, "observation", 100, transparent=True)
 
 
 def draw_tracks() -> None:
@@ -185,7 +143,7 @@ def draw_tracks() -> None:
                 row[level].plot(*played.observed[:, :2].T, "--", color=DRIVEN, lw=1.2)
                 row[level].set(xlim=(0, maze.size), ylim=(0, maze.size))
         _show(row[0], _maze_and_path(played), "the maze, a path", 13)
-    figure.savefig(FOLDER / "tracks.png", dpi=110, metadata={"Software": None})
+    _save(figure, "tracks")
 
 
 def draw_kinds() -> None:
@@ -196,7 +154,7 @@ def draw_kinds() -> None:
     for axes, kind in zip(figure.subplots(3, 3).flat, titles, strict=True):
         maze = mazebench.generate(kind, 31, np.random.default_rng(3))
         _show(axes, _maze_and_path(play(maze, mazes=maze, distances=DISTANCE)), titles[kind])
-    figure.savefig(FOLDER / "kinds.png", dpi=110, metadata={"Software": None})
+    _save(figure, "kinds")
 
 
 class Played(NamedTuple):
@@ -255,7 +213,7 @@ def draw_planner() -> None:
         _show(axes, picture, title, cmap=shades, interpolation="nearest")
         axes.plot(x - 0.5, len(walls) - y - 0.5, color=DRIVEN, marker="o", markersize=4, markevery=[-1])
         axes.plot(column, row, "*", color="#2a9d3a", markersize=9)
-    figure.savefig(FOLDER / "neural-planner.png", dpi=150, metadata={"Software": None})
+    _save(figure, "neural-planner", 150)
 
 
 def draw_changes() -> None:
@@ -272,7 +230,7 @@ def draw_changes() -> None:
     figure = Figure(figsize=(9.6, 3.4), layout="constrained")
     for axes, (title, picture) in zip(figure.subplots(1, 3), pictures.items(), strict=True):
         _show(axes, picture, title)
-    figure.savefig(FOLDER / "your-map.png", dpi=110, metadata={"Software": None})
+    _save(figure, "your-map", columns=1)
 
 
 def draw_real_buildings() -> None:
@@ -283,14 +241,14 @@ def draw_real_buildings() -> None:
         for each in chosen:
             maze = load_building(PREFIX + each.name)
             panels[f"{each.name}\n{each.use}, {each.origin}, {maze.side:.0f} m"] = draw_grid(_cut(maze.walls)[0], 2)
-        _save_panels(panels, 5, f"real-{split}.png")
+        _save_panels(panels, 5, f"real-{split}")
     panels = {}
     for each in buildings().values():
         if each.setting == YEARS:
             maze = load_building(PREFIX + each.name)
             walls, older = _cut(maze.walls, load_older(PREFIX + each.older, PREFIX + each.name).walls)
             panels[each.name.replace("-since-", "\nsince ")] = _draw_changes(walls, older, 2)
-    _save_panels(panels, 4, "real-years.png")
+    _save_panels(panels, 4, "real-years")
 
 
 def _save_panels(panels: Mapping[str, np.ndarray], columns: int, name: str) -> None:
@@ -302,7 +260,7 @@ def _save_panels(panels: Mapping[str, np.ndarray], columns: int, name: str) -> N
         _show(own, picture, title, 7)
     for own in axes[len(panels) :]:
         own.set_axis_off()
-    figure.savefig(FOLDER / name, dpi=110, metadata={"Software": None})
+    _save(figure, name)
 
 
 def _cut(*grids: np.ndarray) -> list[np.ndarray]:
@@ -335,14 +293,14 @@ def draw_looks() -> None:
         ("depth", near, PLAIN, "train", as_it_is),
         ("labels", near, PLAIN, "train", as_it_is),
     )
-    sheet = np.full((len(rows) * 100 - 4, 6 * 100 - 4, 3), 255, dtype=np.uint8)
+    sheet = np.zeros((len(rows) * 100 - 4, 6 * 100 - 4, 4), dtype=np.uint8)
     for row, (name, camera, look, split, exposures) in enumerate(rows):
         eye = RayCamera(envs.task.mazes, camera, look, split)
         pictures = eye.take((name,), rules.maze, rules.pose, rules.marker, *exposures)[name]
         for column, picture in enumerate(pictures):
             top, left = 100 * row, 100 * column
-            sheet[top : top + 96, left : left + 96] = as_colors(name, picture)
-    write_image(sheet, FOLDER / "looks.png")
+            sheet[top : top + 96, left : left + 96] = np.dstack([as_colors(name, picture), np.full((96, 96), 255)])
+    Image.fromarray(sheet).save(FOLDER / "looks.png", optimize=True)
 
 
 def draw_shortest_paths() -> None:
@@ -354,7 +312,7 @@ def draw_shortest_paths() -> None:
         path, length = _path_of_disc(maze, SLIDER.radius, start, goal)
         picture = draw_grid(maze.walls, NEAR_PIXELS, start, goal, path)
         _show(axes, picture, f"{length:.1f} m; on the grid {maze.distance(start, goal)} m", 11)
-    figure.savefig(FOLDER / "shortest-paths.png", dpi=110, metadata={"Software": None})
+    _save(figure, "shortest-paths", columns=1)
 
 
 def _path_of_disc(maze: Maze, radius: float, start: Cell, goal: Cell) -> tuple[np.ndarray, float]:
@@ -420,12 +378,18 @@ def _maze_and_path(played: Played) -> np.ndarray:
     return draw_grid(maze.walls, 31 * PIXELS // maze.size, played.start, played.goal, played.pose[:, :2])
 
 
-def _annotate(on_map: Axes, on_maze: Axes, maze: Maze, seen: ShownMap, start: Cell, goal: Cell) -> None:
-    """Adds to pictures of a shown map and of its maze the path on the map, the doors that moved, and a legend."""
+def annotate(
+    on_map: Axes, on_maze: Axes, maze: Maze, seen: ShownMap, start: Cell, goal: Cell, has_doors: bool = True
+) -> None:
+    """Adds to pictures of a shown map and of its maze the path on the map, and the doors that moved; all in cells."""
+
+    def points(cells: np.ndarray) -> np.ndarray:
+        return maze.point(cells) / maze.cell_size
+
     for label, color in (("start", colors.START), ("goal", colors.GOAL)):
         on_map.plot([], [], "o", color=color, label=label)
     path = path_through_walls(seen.walls, start, goal)
-    on_map.plot(*seen.seen_points(maze.point(np.array(path))).T, "--", lw=2, color=PLANNED, label="path on the map")
+    on_map.plot(*seen.seen_points(points(np.array(path))).T, "--", lw=2, color=PLANNED, label="path on the map")
 
     closed, on_path = maze.walls & ~seen.walls, np.zeros_like(maze.walls)
     on_path[tuple(np.transpose(path))] = True
@@ -435,11 +399,33 @@ def _annotate(on_map: Axes, on_maze: Axes, maze: Maze, seen: ShownMap, start: Ce
         "opened doors": ("o", MOVED, seen.walls & ~maze.walls),
     }
     for label, (marker, shade, doors) in marks.items():
-        if doors.any():
-            points, look = maze.point(np.argwhere(doors)), {"ls": "", "ms": 7, "mew": 2, "fillstyle": "none"}
-            on_maze.plot(*points.T, marker, color=shade, label=label, **look)
-            on_map.plot(*seen.seen_points(points).T, marker, color=shade, **look)
-    on_map.figure.legend(loc="outside lower left", ncols=3, fontsize=13, frameon=False, handlelength=1.5)
+        if doors.any() and has_doors:
+            at, look = points(np.argwhere(doors)), {"ls": "", "ms": 7, "mew": 2, "fillstyle": "none"}
+            on_maze.plot(*at.T, marker, color=shade, label=label, **look)
+            on_map.plot(*seen.seen_points(at).T, marker, color=shade, **look)
+
+
+def add_legend(figure: Figure) -> None:
+    """Names the marks of `annotate` below the panels."""
+    figure.legend(loc="outside lower left", ncols=3, fontsize=13, frameon=False, handlelength=1.5)
+
+
+def _save(figure: Figure, name: str, dpi: int = 110, columns: int = 2, **options: Any) -> None:
+    """Saves a figure, and the form for a phone, in which its panels are in so many columns."""
+    options["metadata"] = {"Software": None}
+    figure.savefig(FOLDER / f"{name}.png", dpi=dpi, **options)
+    spec = figure.axes[0].get_subplotspec()
+    assert spec
+    was, (width, height) = spec.get_gridspec(), figure.get_size_inches()
+    rows = -(-len(figure.axes) // columns)
+    shape = (height / was.nrows) / (width / was.ncols)  # of a panel
+    figure.set_size_inches(WIDTH / 1.6, rows * shape * WIDTH / 1.6 / columns)
+    grid = figure.add_gridspec(rows, columns)
+    for place, axes in enumerate(figure.axes):
+        axes.set_subplotspec(grid[divmod(place, columns)])
+        for text in (axes.title, *axes.texts):
+            text.set_fontsize(min(text.get_fontsize(), 9))
+    figure.savefig(FOLDER / f"{name}-narrow.png", dpi=120, **options)
 
 
 def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **look: Any) -> None:
@@ -449,6 +435,6 @@ def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **lo
 
 
 if __name__ == "__main__":
-    of_episodes = film, draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes
+    of_episodes = draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes
     for draw in (*of_episodes, draw_real_buildings, draw_looks, draw_shortest_paths, draw_explorer, draw_check):
         draw()
