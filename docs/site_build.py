@@ -1,24 +1,30 @@
 """Additions to mkdocs.yml: explained fields, unbroken figures, widths of cells, the address of the repository.
 
-A figure that has a narrow form next to it, NAME-narrow.svg, is shown in that form on a phone.
+A figure that has a narrow form next to it, NAME-narrow.svg or .png, is shown in that form on a phone. A film is still
+for readers whose systems ask for less motion, if there is a picture of its environment. The notebook becomes a page.
 """
 
 from __future__ import annotations
 
 import ast
+import base64
+import json
 import pathlib
 import re
 import textwrap
 import tomllib
 
 import griffe
+from mkdocs.structure.files import File
 
 _COMMENT = re.compile(r"\s# (?!noqa|type:)(.+)$")
 _SHAPE = re.compile(r"^\[[^\]]*\]")
 # 0.94 [0.89, 0.98]; 0.94 / 0.89 / -0.02; the level behind the name of a track.
 _FIGURES = re.compile(r"\d?\.\d+ \[[-+]?\d?\.\d+, [-+]?\d?\.\d+\]|\d?\.\d+(?: / [-+]?\d?\.\d+)+|</code> \d\b")
 _CELL = re.compile(r"<td([^>]*)>(.*?)</td>", re.DOTALL)
-_FIGURE = re.compile(r'<img [^>]*src="([^"]*/)?([^"/]+)\.svg"[^>]*>')
+_FIGURE = re.compile(r'<img [^>]*src="(?P<folder>[^"]*/)?(?P<name>[^"/]+)\.(?P<suffix>svg|png|webp)"[^>]*>')
+_IMAGES = pathlib.Path(__file__).parent / "images"
+_NOTEBOOK = "examples/first_hour"
 _SHORT, _LONG = 24, 60  # letters of a cell that a phone shows on one line, and of one that needs some width
 
 
@@ -32,15 +38,54 @@ def on_config(config, **kwargs) -> None:
 def on_page_content(html: str, **kwargs) -> str:
     """A page with spaces that do not break in figures, and cells of tables that site.css can tell apart by length."""
     html = _CELL.sub(_sized_cell, _FIGURES.sub(lambda found: found[0].replace(" ", "\u00a0"), html))
-    return _FIGURE.sub(_with_narrow, html)
+    return _FIGURE.sub(_with_other_forms, html)
 
 
-def _with_narrow(image: re.Match[str]) -> str:
-    name = f"{image[2]}-narrow.svg"
-    if not (pathlib.Path(__file__).parent / "images" / name).exists():
-        return image[0]
-    source = f'<source media="(max-width: 44em)" srcset="{image[1] or ""}{name}">'
-    return f"<picture>{source}{image[0]}</picture>"
+def on_files(files, config, **kwargs) -> None:
+    """Adds the notebook as a page, and the pictures that it has drawn."""
+    notebook = json.loads(pathlib.Path(config.docs_dir, f"{_NOTEBOOK}.ipynb").read_text(encoding="utf-8"))
+    text, pictures = notebook_page(notebook, pathlib.PurePath(_NOTEBOOK).name)
+    files.append(File.generated(config, f"{_NOTEBOOK}.md", content=text))
+    for name, content in pictures.items():
+        files.append(File.generated(config, f"examples/{name}", content=content))
+
+
+def on_page_markdown(markdown: str, **kwargs) -> str:
+    """A text whose links to the notebook lead to its page; elsewhere they lead to the notebook itself."""
+    return markdown.replace(f"({_NOTEBOOK}.ipynb)", f"({_NOTEBOOK}.md)")
+
+
+def notebook_page(notebook: dict, name: str) -> tuple[str, dict[str, bytes]]:
+    """Returns a notebook's cells and what they have printed, as Markdown, and the pictures that they have drawn."""
+    parts, pictures = [], {}
+    for cell in notebook["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for output in cell.get("outputs", ()):
+            if "text" in output:
+                parts.append(f"```text\n{''.join(output['text']).rstrip()}\n```")
+            elif drawn := output["data"].get("image/png"):
+                picture = f"{name}-{len(pictures) + 1}.png"
+                pictures[picture] = base64.b64decode("".join(drawn))
+                parts.append(f"![What the cell draws]({picture})")
+    parts.insert(1, f"This page is the notebook [{name}.ipynb]({name}.ipynb), with the output of one run.")
+    return "\n\n".join(parts), pictures
+
+
+def _with_other_forms(image: re.Match[str]) -> str:
+    folder, name, suffix = image["folder"] or "", image["name"], image["suffix"]
+    forms = {
+        "(max-width: 44em)": (f"{name}-narrow.{suffix}", folder),
+        "(prefers-reduced-motion: reduce)": (f"environments/{name}.png", folder.removesuffix("films/")),
+    }
+    if suffix != "webp":
+        del forms["(prefers-reduced-motion: reduce)"]
+    sources = [
+        f'<source media="{media}" srcset="{place}{form}">'
+        for media, (form, place) in forms.items()
+        if (_IMAGES / form).exists()
+    ]
+    return f"<picture>{''.join(sources)}{image[0]}</picture>" if sources else image[0]
 
 
 def _sized_cell(cell: re.Match[str]) -> str:

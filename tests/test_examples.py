@@ -10,6 +10,7 @@ import re
 import runpy
 import shutil
 import sys
+import textwrap
 
 import cv2
 import gymnasium
@@ -153,6 +154,13 @@ class TestScripts:
         )
         summary = json.loads((tmp_path / "results" / "summary.json").read_text())
         assert (summary["overall"]["n"], summary["overall"]["success_rate"]) == (30, 1.0)
+
+    def test_the_tutorial_on_imitation_has_the_code_of_dagger(self):
+        code = (EXAMPLES / "dagger.py").read_text(encoding="utf-8")
+        blocks = re.findall(r"```python\n(.*?)```", (EXAMPLES.parent / "tutorials" / "imitation.md").read_text(), re.S)
+        assert len(blocks) == 4
+        for block in blocks:
+            assert block in code or textwrap.indent(block, "    ") in code
 
     def test_dagger(self, script):
         needs("torch")
