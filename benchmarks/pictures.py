@@ -61,6 +61,8 @@ DRIVEN = "#d1495b"
 MIDWAY = "#c850a0"  # of the middle of a path in a drawing of a maze
 PLANNED = "#7b2cbf"  # of the shortest path on the map, and of the door that closes it
 ODOMETRY = "#0b7a8a"
+# Of figures with pictures or heat maps, which dark pages don't invert: read on a white and on a dark page.
+GREY_TEXT: Any = {"text.color": "#808080"}
 
 OBSERVED = 6  # seed of the episode
 SEEN = 4  # likewise of the places in all looks
@@ -91,7 +93,7 @@ def draw_environments() -> None:
         figure.savefig(FOLDER / "environments" / f"{name}.png", dpi=100, metadata={"Software": None})
 
 
-@mpl.rc_context({"text.color": "#808080"})  # which is read on a white and on a dark page
+@mpl.rc_context(GREY_TEXT)
 def draw_observation() -> None:
     """Draws what the agent observes in a moment of `rebuilt` 2, with a camera besides the lidar."""
     env = mazebench.make("rebuilt", level=2, sensors=("lidar", "egocentric"))
@@ -185,6 +187,7 @@ def play(maze: Maze | None, agent: str = "oracle", **options: Any) -> Played:
     return Played(task.mazes[index], record.start, record.goal, pose, observed, shown, seen)
 
 
+@mpl.rc_context(GREY_TEXT)
 def draw_planner() -> None:
     """Draws what the neural planner knows, pays and plans in the middle of an episode."""
     asked = TaskOptions(task="rebuilt", level=(2,), distances=(35,))
@@ -213,7 +216,7 @@ def draw_planner() -> None:
         _show(axes, picture, title, cmap=shades, interpolation="nearest")
         axes.plot(x - 0.5, len(walls) - y - 0.5, color=DRIVEN, marker="o", markersize=4, markevery=[-1])
         axes.plot(column, row, "*", color="#2a9d3a", markersize=9)
-    _save(figure, "neural-planner", 150)
+    _save(figure, "neural-planner", 150, transparent=True)
 
 
 def draw_changes() -> None:
