@@ -167,7 +167,7 @@ class Maze:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         source = self.require_free(source)
         if self.keeps_distances:
-            return np.argwhere(self._distances_from(source) == distance)
+            return np.transpose((self._distances_from(source) == distance).nonzero())
         cells, ends = self._search(source, farthest=distance)
         at_distance = cells[ends[distance - 1] if distance else 0 :] if len(ends) > distance else cells[:0]
         return np.stack(np.divmod(np.sort(at_distance).astype(np.int64), self.size), axis=-1)
