@@ -161,22 +161,26 @@ def _place(
             while place > 0 and near[place - 1] > box:
                 place -= 1
             if box < size * size and (place == 0 or near[place - 1] < box):
-                near[place + 1 : count + 1] = near[place:count].copy()
+                for behind in range(count, place, -1):
+                    near[behind] = near[behind - 1]
                 near[place] = box
                 count += 1
 
         for box in range(pos.shape[1]):
             if box < count:
                 top, left = near[box] // size, near[box] % size
-                bottom, right = end[slot, near[box]]
+                bottom, right = end[slot, near[box], 0], end[slot, near[box], 1]
                 pos[env, box, 0], half[env, box, 0] = scale * (left + right) / 2, scale * (right - left) / 2
                 pos[env, box, 1], half[env, box, 1] = scale * (size - (top + bottom) / 2), scale * (bottom - top) / 2
                 pos[env, box, 2] = half[env, box, 2] = WALL_HEIGHT / 2
             else:  # it is not needed, and lies below the floor
-                pos[env, box], half[env, box] = parked[0][box], parked[1][box]
-            x, y, z = half[env, box]
-            aabb[env, box, 3:] = half[env, box]
-            rbound[env, box] = math.sqrt(x * x + y * y + z * z)
+                for axis in range(3):
+                    pos[env, box, axis], half[env, box, axis] = parked[0][box, axis], parked[1][box, axis]
+            squared = 0.0
+            for axis in range(3):
+                aabb[env, box, 3 + axis] = half[env, box, axis]
+                squared += half[env, box, axis] * half[env, box, axis]
+            rbound[env, box] = math.sqrt(squared)
 
 
 def near_walls_of(mazes: StandingMazes, num_envs: int, body: Body) -> NearWalls:
