@@ -9,9 +9,9 @@ import pytest
 from made_results import make_record
 from simple_mazes import field
 
-from mazebench.maps.maze import Maze, path_through_walls
+from mazebench.maps.maze import Maze
 from mazebench.maps.older_map import OlderMap
-from mazebench.results.trouble import CLOSED, DETOUR, OPENED, find_spots, shortest_way
+from mazebench.results.trouble import CLOSED, DETOUR, OPENED, find_spots
 
 
 def two_rooms(*doors: int) -> np.ndarray:
@@ -86,16 +86,3 @@ def test_a_wide_passage_is_one_place():
 
 def test_a_map_that_is_right_has_no_trouble():
     assert spots_of(two_rooms(5), two_rooms(5), [(LEFT, RIGHT)], [0.3]) == []
-
-
-def test_the_way_is_that_of_the_records_fact():
-    rng = np.random.default_rng(0)
-    walls = field(21).walls | (rng.random((21, 21)) < 0.2)
-    free = np.argwhere(~walls)
-    way = shortest_way(two_rooms(5, 19), LEFT, (17, 15))
-    assert way == path_through_walls(two_rooms(5, 19), LEFT, (17, 15))
-    for _ in range(20):
-        start, goal = (tuple(map(int, free[each])) for each in rng.integers(len(free), size=2))
-        expected = path_through_walls(walls, start, goal)
-        if not walls[tuple(np.array(expected).T)].any():
-            assert shortest_way(walls, start, goal) == expected

@@ -95,6 +95,10 @@ class TestBits:
         assert SLIDER.fastest >= 3.643  # m/s, which no two drives exceed (the comment in its file)
 
 
+def write_one(walls, geoms, maze, cell):
+    walls.write(geoms, np.array([0]), np.array([maze]), np.array([cell]))
+
+
 class TestBoxes:
     @pytest.mark.parametrize(("cell_size", "reach"), [(1.0, 1), (0.75, 2), (0.4, 2)])
     def test_those_within_reach_of_a_cell_are_there_in_order(self, cell_size, reach):
@@ -103,7 +107,7 @@ class TestBoxes:
         walls = NearWalls((maze,), 1, SLIDER)
         geoms = WallGeoms.of_model(walls.model)
         for row, column in maze.free_cells[::7].tolist():
-            walls.write_one(geoms, 0, row * maze.size + column)
+            write_one(walls, geoms, 0, row * maze.size + column)
             near = [
                 index
                 for index, box in enumerate(maze.boxes)
@@ -114,16 +118,15 @@ class TestBoxes:
                 np.testing.assert_array_equal(values[0, : len(near)], expected, err_msg=name)
             assert (geoms.pos[0, len(near) :, 2] < 0).all()
 
-    @pytest.mark.parametrize("num_others", [1, 7])  # the boxes of a few bodies are looked up one by one
-    def test_environments_may_be_in_different_fresh_mazes(self, num_others):
+    def test_environments_may_be_in_different_fresh_mazes(self):
         mazes = FreshMazes(("dfs", "house"), 13)
         walls, alone = NearWalls(mazes, 10, SLIDER), NearWalls((mazes[9],), 1, SLIDER)
         expected = WallGeoms.of_model(alone.model)
         geoms = WallGeoms(*(np.zeros((10, *each.shape[1:])) for each in expected))
         cell = int(mazes[9].free_cells[4] @ (13, 1))
-        others = np.arange(num_others)
+        others = np.arange(7)
         walls.write(geoms, np.append(others, 8), np.append(others + 5, 9), np.append(others * 0 + 14, cell))
-        alone.write_one(expected, 0, cell)
+        write_one(alone, expected, 0, cell)
         np.testing.assert_array_equal(geoms.pos[8], expected.pos[0])
         assert not geoms.pos[9].any()
 
@@ -149,7 +152,7 @@ def test_the_boxes_near_a_body_are_the_walls_there_whichever_doors_have_moved():
         number = len(mazes) * int(rng.integers(2**num_doors))
         stands = mazes[number].walls
         row, column = maze.free_cells[rng.integers(len(maze.free_cells))].tolist()
-        walls.write_one(geoms, number, row * maze.size + column)
+        write_one(walls, geoms, number, row * maze.size + column)
         around = np.argwhere(np.ones((3, 3))) + np.array([row - 1, column - 1])
         off = np.abs(geoms.pos[0, :, None, :2] - maze.point(around))
         is_wall = ((off < geoms.size[0, :, None, :2]).all(axis=-1) & (geoms.pos[0, :, None, 2] > 0)).any(axis=0)

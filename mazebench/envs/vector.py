@@ -124,6 +124,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._sensordata = self._batch.bind("sensordata")
         self._qpos = self._batch.bind("qpos")
         self._qvel = self._batch.bind("qvel")
+        self._to_clear = [self._qvel, *map(self._batch.bind, ("qacc_warmstart", "time"))]  # when an episode begins
         self._ctrl = self._batch.bind("ctrl")
         self._marker = self._batch.bind("mocap_pos")
         self._top_camera: Cameras | None = None  # of `render`
@@ -249,7 +250,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in indices:
             final_obs[i] = {name: values[i].copy() for name, values in self._observed.items()}
-        final_info = infos | {key: ended for key in infos if key.startswith("_")}
+        final_info = infos | dict.fromkeys(self._masks, ended)
 
         # The next episodes, and the infos of now.
         began = self._begin_episodes(indices)
@@ -274,7 +275,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # Reset the simulations, place walls, bodies and markers, and compute what follows from that.
         self._surround()
-        self._batch.reset(began, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+        for values in self._to_clear:
+            values[began] = 0
         self._qpos[began] = self.rules.pose[began]
         self._marker[began, 0] = self.rules.marker[began]
         self._batch.forward(began, stage=_VELOCITY_STAGE)
@@ -325,7 +327,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         if self._top_camera is not None:
             self._top_camera.close()
         del self._batch, self._geoms  # with the views of its arrays, which ends the threads
-        del self._sensordata, self._qpos, self._qvel, self._ctrl, self._marker
+        del self._sensordata, self._qpos, self._qvel, self._ctrl, self._marker, self._to_clear
 
 
 def _seeds(seed: Seeds, num_envs: int) -> list[int | None]:

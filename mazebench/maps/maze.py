@@ -167,7 +167,7 @@ class Maze:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         source = self.require_free(source)
         if self.keeps_distances:
-            return np.argwhere(self._distances_from(source) == distance)
+            return np.transpose((self._distances_from(source) == distance).nonzero())
         cells, ends = self._search(source, farthest=distance)
         at_distance = cells[ends[distance - 1] if distance else 0 :] if len(ends) > distance else cells[:0]
         return np.stack(np.divmod(np.sort(at_distance).astype(np.int64), self.size), axis=-1)
@@ -246,18 +246,34 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     so on maps with flipped cells (the paper's appendix on perturbed planning). Of several, it is the path whose first
     differing step comes first in the order up, left, down, right.
     """
-    costs = np.full((len(walls) + 2, len(walls) + 2), math.inf)
-    costs[1:-1, 1:-1][~walls] = 1
-    if path := _cheapest_path(costs, start, goal):
-        return path
-    costs[1:-1, 1:-1][walls] = _WALL_COST
-    return _cheapest_path(costs, start, goal)
+    from mazebench.maps.search import distances  # which needs numba
+
+    # Backwards from the goal, in a closed border: the cells from each cell to the goal.
+    width = len(walls) + 2
+    closed = np.ones((width, width), dtype=bool)
+    closed[1:-1, 1:-1] = walls
+    cell, last = ((row + 1) * width + column + 1 for row, column in (start, goal))
+    left = distances(closed, last, cell).ravel().tolist()
+    if left[cell] < 0 or walls[goal]:
+        costs = np.full(closed.shape, math.inf)
+        costs[1:-1, 1:-1] = np.where(walls, _WALL_COST, 1)
+        return _cheapest_path(costs, start, goal)
+
+    # Forwards.
+    path, moves = [start], [down * width + right for down, right in _NEIGHBOURS]
+    while cell != last:
+        for move in moves:
+            if left[cell + move] == left[cell] - 1:
+                break
+        cell += move
+        path.append((cell // width - 1, cell % width - 1))
+    return path
 
 
 def _cheapest_path(costs: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
-    """Returns a path whose cells cost the least to enter; an empty one if there is none.
+    """Returns a path whose cells cost the least to enter.
 
-    `costs` (`[N + 2, N + 2]` float) are those of the cells and of a border. Infinite ones can't be entered.
+    `costs` (`[N + 2, N + 2]` float) are those of the cells and of a border, which can't be entered: infinite.
     """
     # Cells are numbers in a list of all rows: plain numbers take a fraction of the time of arrays.
     width, cost = len(costs), costs.ravel().tolist()
@@ -276,8 +292,6 @@ def _cheapest_path(costs: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
                 if through < left[cell + move]:
                     left[cell + move] = through
                     nexts.append(cell + move)
-    if not 0 <= left[first] < math.inf:
-        return []
 
     # Forwards.
     path = [first]

@@ -51,5 +51,7 @@ def distances(walls: np.ndarray, source: int, goal: int = -1) -> np.ndarray:
     """Returns the distances of cells, `[N, N]` int32, -1 where `search` does not come; see there."""
     cells, ends = search(walls, source, goal, walls.size)
     found = np.full(walls.shape, -1, dtype=np.int32)
-    found.ravel()[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
+    counts = ends.copy()
+    counts[1:] -= ends[:-1]
+    found.ravel()[cells] = np.repeat(np.arange(len(ends)), counts)
     return found

@@ -13,10 +13,10 @@ import numpy as np
 import scipy.ndimage
 import scipy.spatial
 
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.maps.older_map import OlderMap
 from mazebench.maps.readers.occupancy_grid import points_from
-from mazebench.maps.search import distances, search
+from mazebench.maps.search import search
 from mazebench.results.records import Record
 
 # What a place is now: a wall on the way of the map, free where the map has a wall, or where trips leave the right way.
@@ -24,7 +24,6 @@ CLOSED, OPENED, DETOUR = "closed", "open", "detour"
 LEAST = 0.5  # m that a trip loses, from which on a place is looked for
 _NEAR = 1.0  # m; places that are no farther apart are one, and so are ways
 _SMALL = 3.0  # m, the longer side of a change that is one place, such as a closed passage
-_STEPS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # up, left, down, right, as `path_through_walls` prefers them
 
 
 class Spot(NamedTuple):
@@ -115,7 +114,7 @@ def _parting(driven: np.ndarray, right: np.ndarray) -> np.ndarray:
 def _places(older: OlderMap, start: Cell, goal: Cell) -> list[_Place]:
     """Returns where the map's shortest way meets walls of the maze, and where the maze's way meets those of the map."""
     found = []
-    on_map, in_maze = (shortest_way(walls, start, goal) for walls in (older.walls, older.maze.walls))
+    on_map, in_maze = (path_through_walls(walls, start, goal) for walls in (older.walls, older.maze.walls))
     saved = len(on_map) - len(in_maze)  # cells, at most, by what is open now
     for kind, way, other in ((CLOSED, on_map, older.maze.walls), (OPENED, in_maze, older.walls)):
         is_wall = other[tuple(np.array(way).T)]
@@ -127,16 +126,6 @@ def _places(older: OlderMap, start: Cell, goal: Cell) -> list[_Place]:
             if kind == CLOSED or around > 0:
                 found.append(_Place(way[(before + 1 + last) // 2], kind, around))
     return found
-
-
-def shortest_way(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
-    """Returns the cells of the shortest way on a map (`[N, N]` bool) that `path_through_walls` finds, in less time."""
-    size = len(walls)
-    left, way = distances(walls, goal[0] * size + goal[1], start[0] * size + start[1]), [start]
-    while (here := way[-1]) != goal:
-        nexts = ((here[0] + down, here[1] + right) for down, right in _STEPS)
-        way.append(next(cell for cell in nexts if left[cell] == left[here] - 1))
-    return way
 
 
 def _num_steps(walls: np.ndarray, start: Cell, goal: Cell) -> float:

@@ -171,8 +171,8 @@ class Rules:
         size = self.task.size
         self.is_first[i] = True
         self.context[i] = leg_context(self.task, shown, route.start, route.target)
-        cells = np.array([route.start, route.target, route.goal])
-        self.start[i], self.target[i], self._goal[i] = cells @ (size, 1)
+        ends = (route.start, route.target, route.goal)
+        self.start[i], self.target[i], self._goal[i] = (row * size + column for row, column in ends)
         self.marker[i, :2] = self.task.standing[self.maze.item(i)].point(route.goal)
         self.time_limit[i], self._deadline[i] = route.time_limit, route.deadline
         self.landmark[i] = route.leg
@@ -207,8 +207,13 @@ class Rules:
         # All mazes have one size and one cell size, so the first one converts the points of all.
         cells = self.task.mazes[0].cell_index(self.pose[:, :2])
         entered = (cells != self.cell).nonzero()[0]
+        self.cell[:] = cells
+        ways, is_rewarded = self._ways, self.task.options.reward == PROGRESS
         for i, cell in zip(entered.tolist(), cells[entered].tolist(), strict=True):
-            self._enter(i, cell)
+            if (way := ways[i]) is not None:
+                if is_rewarded:
+                    self.progress[i] = self.way_left[i] - way[cell]
+                self.way_left[i] = way[cell]
 
         # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         due = (self.cell == self.target) | (self.cell == self._goal) | (self.steps >= self._deadline)
@@ -229,18 +234,13 @@ class Rules:
         row, column = cell = self.task.mazes[0].cell_at(x, y)
         index = row * self.task.size + column
         if index != self.cell.item(0):
-            self._enter(0, index)
+            self.cell[0] = index
+            if (way := self._ways[0]) is not None:
+                if self.task.options.reward == PROGRESS:
+                    self.progress[0] = self.way_left.item(0) - way.item(index)
+                self.way_left[0] = way.item(index)
         if index == self.target.item(0) or index == self._goal.item(0) or steps >= self._deadline.item(0):
             self._follow_route(0, cell)
-
-    def _enter(self, i: int, cell: int) -> None:
-        """Takes note that the body of environment i has entered a cell."""
-        self.cell[i] = cell
-        if (way := self._ways[i]) is not None:
-            way_left = way.item(cell)
-            if self.task.options.reward == PROGRESS:
-                self.progress[i] = self.way_left.item(i) - way_left
-            self.way_left[i] = way_left
 
     def _follow_route(self, i: int, cell: Cell) -> None:
         """Takes note of what the step led to in environment i, whose body is in `cell`."""
@@ -307,9 +307,9 @@ class Rules:
             chosen = indices.tolist()
             errors, noise = [errors[i] for i in chosen], [noise[i] for i in chosen]
             worlds = self.maze[indices], self.pose[indices], self.marker[indices]
-        for state, of_state in zip(states, errors, strict=True):
+        for i, of_state in enumerate(errors):
             for add_error in of_state:
-                add_error(state)
+                add_error(states[i])
         observed = {"state": states.astype(np.float32)}
         if self.task.options.sensors:
             maze, pose, marker = worlds

@@ -149,8 +149,15 @@ class Task:
         """True if the context may change within an episode: at landmarks, or where one goal follows another."""
         return self.options.is_hierarchical or self.options.num_goals > 1
 
-    def perturbations(self, level: int) -> list[Perturbation]:
+    def perturbations(self, level: int) -> tuple[Perturbation, ...]:
         """Returns those of the options and of a level of the track, in the order in which they apply."""
+        return self._perturbations[level - 1]
+
+    @functools.cached_property
+    def _perturbations(self) -> list[tuple[Perturbation, ...]]:
+        return [tuple(self._find_perturbations(level)) for level in LEVELS]
+
+    def _find_perturbations(self, level: int) -> list[Perturbation]:
         options = self.options
         strengths = {name: strength for name in OF_OPTION if (strength := getattr(options, name)) is not None}
         found = [OF_OPTION[name](strength) for name, strength in strengths.items() if strength]

@@ -15,15 +15,13 @@ import mujoco.batch
 import numpy as np
 
 from mazebench.constants import STEP_TIME
-from mazebench.maps.maze import Maze
+from mazebench.kernels import compiled
+from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.maps.moving_doors import ChangingMazes, MovedMaze, StandingMazes, moving_doors
 from mazebench.world.bodies import Body
-from mazebench.world.mjcf import boxes_spec, parked_boxes, placed_boxes
+from mazebench.world.mjcf import boxes_spec, parked_boxes
 
-_MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
 _MOST_GRIDS = 64  # of mazes, those used last
-_AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
-_FEW = 4  # bodies in other cells, whose boxes are sooner looked up one by one
 _FIRST_WALL = 1  # index of its geom, after the floor
 # Contacts are searched without trees of bounding boxes, and not sorted into islands, of which one body has one.
 _NOT_NEEDED = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE | mujoco.mjtDisableBit.mjDSBL_ISLAND)
@@ -60,9 +58,7 @@ class NearWalls:
         """`num_slots` is how many mazes are kept: all of them or, of fresh or changing ones, one per environment."""
         self._mazes, self._size, self._scale = mazes, mazes[0].size, mazes[0].cell_size
         self._args, self._is_fresh = (mazes, num_slots, body), not isinstance(mazes, tuple)
-        # By maze: what `_grid` returns of those that were shown last; [N, N] int, the set of its doors near each cell.
-        self._grids: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        self._near_doors: dict[int, np.ndarray] = {}
+        self._grids: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # by maze: what `_grid` returns of those shown last
         # From the body's centre at the start of an agent step.
         reach = math.ceil((body.reach + body.fastest * STEP_TIME) / self._scale)  # cells
         width = self._size + 2 * reach
@@ -76,8 +72,6 @@ class NearWalls:
         self._shown = np.full(num_slots, -1, dtype=np.int64)  # the maze that a slot has
         self._first = np.zeros((num_slots, width * width), dtype=np.int32)  # of a wall cell, the first cell of its box
         self._end = np.zeros((num_slots, self._none, 2), dtype=np.int16)  # of a first cell, the box's bottom and right
-
-        self._entered: dict[tuple[int, int], list[np.ndarray]] = {}  # by maze and cell: what `_near` returns
 
         self.model = boxes_spec(mazes[0], *self._parked, body=body).compile()
         self.model.opt.disableflags |= _NOT_NEEDED
@@ -95,64 +89,13 @@ class NearWalls:
           maze: `[E]` int, the index of the maze that each is in.
           cell: `[E]` int, the body's cell in it, as row * N + column.
         """
-        if len(env) <= _FEW:
-            for where in zip(maze.tolist(), cell.tolist(), env.tolist(), strict=True):
-                self.write_one(geoms, *where)
-            return
         slot = env if self._is_fresh else maze
         for at, shown in {(int(slot[i]), int(maze[i])) for i in np.flatnonzero(self._shown[slot] != maze)}:
             self._show(at, shown)
-        _assign(geoms, env, *self._near(slot, cell))
-
-    def write_one(self, geoms: WallGeoms, maze: int, cell: int, env: int = 0) -> None:
-        """Does what `write` does for a single environment, and prepares the cells around, which take little longer."""
-        key = self._stands(maze, cell), cell
-        if (boxes := self._entered.get(key)) is None:
-            slot = env if self._is_fresh else maze
-            if self._shown[slot] != maze:
-                self._show(slot, maze)
-            if len(self._entered) > _MOST_ENTERED:
-                self._entered.clear()
-            row, column = divmod(cell, self._size)
-            rows, columns = (slice(max(0, at - _AHEAD), at + _AHEAD + 1) for at in (row, column))
-            cells = np.argwhere(~self._mazes[maze].walls[rows, columns]) + np.array([rows.start, columns.start])
-            near = np.append(cells @ (self._size, 1), cell)  # which is a wall where there is no body
-            rows_of = zip(near.tolist(), *self._near(np.full(len(near), slot), near), strict=True)
-            found = {(self._stands(maze, each), each): values for each, *values in rows_of}
-            self._entered |= found
-            boxes = found[key]
-        _assign(geoms, env, *boxes)
-
-    def _stands(self, maze: int, cell: int) -> int:
-        """Returns the number of a maze that has the same walls near a cell, with no door moved elsewhere."""
-        if maze < (count := len(self._mazes)):
-            return maze
-        moved, maze = divmod(maze, count)
-        if (near := self._near_doors.get(maze)) is None:
-            near = self._near_doors[maze] = np.zeros((self._size, self._size), dtype=np.int64)
-            for number, (top, left, bottom, right, _) in enumerate(moving_doors(self._mazes[maze])):
-                first_row, first_column = max(0, top - self._reach), max(0, left - self._reach)
-                near[first_row : bottom + self._reach, first_column : right + self._reach] |= 1 << number
-        return maze + count * (moved & near.item(cell))
-
-    def _near(self, slot: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns middles, half sides (`[E, K, 3]` m) and radii (`[E, K]` m) of the boxes near cells of slots."""
-        # The boxes in the window, each once, in the maze's order.
-        row, column = np.divmod(cell, self._size)
-        boxes = self._first[slot[:, None], (row * self._width + column)[:, None] + self._offsets]  # [E, W]
-        boxes.sort(axis=1)
-        boxes[:, 1:][boxes[:, 1:] == boxes[:, :-1].copy()] = self._none
-        boxes.sort(axis=1)
-        boxes = boxes[:, : self.num_boxes]
-        is_box = boxes < self._none
-
-        # Those that are not needed are below the floor.
-        first = np.where(is_box, boxes, 0)
-        top, left = np.divmod(first, self._size)
-        bottom, right = np.moveaxis(self._end[slot[:, None], first], -1, 0)
-        placed = placed_boxes(top, left, bottom, right, self._size, self._scale)
-        middle, half = (np.where(is_box[..., None], *pair) for pair in zip(placed, self._parked, strict=True))
-        return middle, half, np.sqrt((half * half).sum(axis=-1))
+        _place(
+            self._first, self._end, slot, cell, self._offsets, self._width, self._size, self._scale, self._parked, env,
+            *geoms,
+        )  # fmt: skip
 
     def _show(self, slot: int, maze: int) -> None:
         """Puts a maze into a slot."""
@@ -196,11 +139,48 @@ class NearWalls:
         return kept
 
 
-def _assign(geoms: WallGeoms, env: np.ndarray | int, middle: np.ndarray, half: np.ndarray, radius: np.ndarray) -> None:
-    geoms.pos[env] = middle
-    geoms.size[env] = half
-    geoms.aabb[env, :, 3:] = half
-    geoms.rbound[env] = radius
+@compiled
+def _place(
+    first: np.ndarray, end: np.ndarray, slots: np.ndarray, cells: np.ndarray, offsets: np.ndarray, width: int,
+    size: int, scale: float, parked: tuple[np.ndarray, np.ndarray], envs: np.ndarray,
+    pos: np.ndarray, half: np.ndarray, aabb: np.ndarray, rbound: np.ndarray,
+) -> None:  # fmt: skip
+    """Writes the boxes in the windows around cells into the `WallGeoms` of environments, as `placed_boxes` would.
+
+    The first of the arrays are attributes of `NearWalls`.
+    """
+    near = np.empty(len(offsets), dtype=np.int64)  # the first cells of boxes
+    for number, env in enumerate(envs):
+        slot, row, column = slots[number], cells[number] // size, cells[number] % size
+
+        # The boxes in the window, each once, in the maze's order.
+        count = 0
+        for offset in offsets:
+            box = first[slot, row * width + column + offset]
+            place = count
+            while place > 0 and near[place - 1] > box:
+                place -= 1
+            if box < size * size and (place == 0 or near[place - 1] < box):
+                for behind in range(count, place, -1):
+                    near[behind] = near[behind - 1]
+                near[place] = box
+                count += 1
+
+        for box in range(pos.shape[1]):
+            if box < count:
+                top, left = near[box] // size, near[box] % size
+                bottom, right = end[slot, near[box], 0], end[slot, near[box], 1]
+                pos[env, box, 0], half[env, box, 0] = scale * (left + right) / 2, scale * (right - left) / 2
+                pos[env, box, 1], half[env, box, 1] = scale * (size - (top + bottom) / 2), scale * (bottom - top) / 2
+                pos[env, box, 2] = half[env, box, 2] = WALL_HEIGHT / 2
+            else:  # it is not needed, and lies below the floor
+                for axis in range(3):
+                    pos[env, box, axis], half[env, box, axis] = parked[0][box, axis], parked[1][box, axis]
+            squared = 0.0
+            for axis in range(3):
+                aabb[env, box, 3 + axis] = half[env, box, axis]
+                squared += half[env, box, axis] * half[env, box, axis]
+            rbound[env, box] = math.sqrt(squared)
 
 
 def near_walls_of(mazes: StandingMazes, num_envs: int, body: Body) -> NearWalls:

@@ -101,8 +101,10 @@ def _add_noise(picture, place, noise):  # type: ignore[no-untyped-def]
     """Adds noise from a place in the table to a picture; each row begins at a place of its own."""
     for i in range(len(picture)):
         line, first = picture[i].reshape(-1), (place + _ROW_OF_NOISE * i) % NUM_NOISE
-        for k in range(len(line)):
-            line[k] = min(max(np.int16(line[k]) + noise[first + k], 0), 255)
+        levels = noise[first : first + len(line)]
+        for k in range(len(line)):  # in 16 bits, so that a vector of the processor holds many
+            level = np.int16(np.int16(line[k]) + np.int16(levels[k]))
+            line[k] = np.uint8(min(max(level, np.int16(0)), np.int16(255)))
 
 
 @kernel

@@ -81,7 +81,7 @@ class MujocoSimulation(Simulation):
 
     def surround(self, maze: int, cell: int) -> None:
         if self._walls is not None and (maze, cell) != self._around:
-            self._walls.write_one(self._geoms, maze, cell)
+            self._walls.write(self._geoms, np.array([0]), np.array([maze]), np.array([cell]))
             self._around = maze, cell
 
     @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -93,7 +94,7 @@ class CameraSensor(Sensor[CameraOptions]):
         self._names = names
         self.stream = Stream.PICTURE_NOISE if options.look == VARIED else None
         self._camera = RayCamera(mazes, options.camera, options.look, options.look_split)
-        self._exposures = np.log(EXPOSURES[options.look_split])
+        self._exposures = np.log(EXPOSURES[options.look_split]).tolist()
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, H, H, ...]` by name, as in `PICTURES`."""
@@ -101,7 +102,9 @@ class CameraSensor(Sensor[CameraOptions]):
         gain, noise_at = np.ones(count, dtype=np.float32), np.full(count, -1)
         for i, rng in enumerate(worlds.rngs):
             if rng is not None:
-                gain[i], noise_at[i] = np.exp(rng.uniform(darkest, brightest)), rng.integers(NUM_NOISE)
+                # As `rng.uniform(darkest, brightest)` and `rng.integers(NUM_NOISE)`, a power of 2, in half of the time.
+                gain[i] = math.exp(darkest + (brightest - darkest) * rng.random())
+                noise_at[i] = NUM_NOISE * rng.random(dtype=np.float32)
         return self._camera.take(
             self._names, worlds.maze, worlds.pose, worlds.marker, gain, noise_at, worlds.num_threads
         )
