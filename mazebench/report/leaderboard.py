@@ -113,7 +113,7 @@ def _tables_of(entries: Sequence[Entry]) -> str:
     ranks = rates.rank(method="min", ascending=False).astype(int).tolist()
     # Gains are over the navigator without the map.
     floor = next((entry.on_time[0] for entry in entries if entry.agent == "navigator without map"), np.nan)
-    num_open = sum(entry.on_time[0] >= FOLDED for entry in entries)
+    num_open = int((rates >= FOLDED).sum())
     text = _tables_of_rows(entries[:num_open], ranks[:num_open], floor) if num_open else ""
     if folded := entries[num_open:]:
         summary = f"On-time rate below {FOLDED}: {len(folded)} agent{'s' * (len(folded) > 1)}"
