@@ -242,7 +242,7 @@ def draw_formats() -> None:
                     on_file.text(0, 1, str(np.load(path).astype(int)).replace(" ", NO_BREAK), **_TEXT_OF_FILE)
                 else:
                     lines = path.read_text(encoding="utf-8").rstrip().splitlines()
-                    lines = [part for line in lines for part in textwrap.wrap(line, 22, drop_whitespace=False)]
+                    lines = [part for line in lines for part in textwrap.wrap(line, 27, drop_whitespace=False)]
                     on_file.text(0, 1, "\n".join(lines).replace(" ", NO_BREAK), **_TEXT_OF_FILE)
                 maze = read_located(path, **options)[0]
                 on_maze.imshow(~maze.walls, cmap="gray", vmin=-0.25, vmax=1, interpolation="nearest")
