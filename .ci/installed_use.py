@@ -24,7 +24,7 @@ for folder, agent, episodes in (("planner", "planner", 1500), ("agent", sys.argv
 
 readme = metadata.metadata("mazebench-mujoco").get_payload()
 blocks = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
-assert len(blocks) >= 3, "README.md shows a dm_control environment, Gymnasium ones, and an agent"
+assert blocks, "README.md shows environments"
 names: dict[str, object] = {}
 for block in blocks:
     exec(compile(block, "README.md", "exec"), names)

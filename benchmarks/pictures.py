@@ -5,12 +5,15 @@ Episodes are in train mazes, or in mazes of no split. The films are made by `ben
 
 from __future__ import annotations
 
+import itertools
+import json
 import pathlib
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -29,9 +32,10 @@ from mazebench.maps.benchmark import FROZEN_SPLITS, load_kind_mazes, load_mazes
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells, path_through_walls
-from mazebench.maps.pictures import draw_grid, draw_rays
+from mazebench.maps.maze_files import read_located
+from mazebench.maps.pictures import draw_grid, draw_rays, write_image
 from mazebench.maps.real_buildings import PREFIX, RIGHT, YEARS, building_of, buildings, load_building, load_older
-from mazebench.report.figures import WIDTH
+from mazebench.report.figures import WIDTH, to_svg
 from mazebench.report.page import lay_on_first_pose
 from mazebench.report.write_report import write_report
 from mazebench.results.played import Shown, shown_of
@@ -68,6 +72,14 @@ OBSERVED = 6  # seed of the episode
 SEEN = 4  # likewise of the places in all looks
 STRIDE = 0.15  # m, of a drawn shortest path
 EXPLORED = 28  # the episode in the explorer
+SMALL_MAZE = "#######\n#...#.#\n###.#.#\n#.....#\n#.###.#\n#.....#\n#######\n"  # in the picture of formats
+NO_BREAK = "\u00a0"  # a space that SVG keeps
+_TEXT_OF_FILE: Any = {"family": "monospace", "fontsize": 6.8, "va": "top"}
+DETOUR = 25  # the episode in that building of which the front pages have a picture
+THEMES = {
+    "": {"page": "#ffffff", "wall": "#4d535c", "floor": "#ffffff", "text": "#1f2328", "path": PLANNED},
+    "-dark": {"page": "#0d1117", "wall": "#8b949e", "floor": "#0d1117", "text": "#e6edf3", "path": "#c9a0f5"},
+}
 CHECKED = "pal-office-7th-floor-changed-1"  # the real building whose old map is checked
 
 
@@ -127,6 +139,117 @@ def draw_observation() -> None:
     _show(last, np.zeros((1, 1, 4)), "state: 12 numbers", 13, extent=(0, 1, 0, 1))
     last.text(0, 0.98, text, fontsize=13, va="top", linespacing=1.2)
     _save(figure, "observation", 100, transparent=True)
+
+
+def draw_old_map() -> None:
+    """Draws a scanned office as its old map shows it and as it is, with the path on the map and the robot's.
+
+    There are a wide and a narrow form, for light and for dark pages.
+    """
+    maze, older = load_building(PREFIX + CHECKED), load_older(PREFIX + building_of(CHECKED).older, PREFIX + CHECKED)
+    maps = {"mazes": PREFIX + CHECKED, "shown": PREFIX + building_of(CHECKED).older}
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        mazebench.evaluate("navigator", out=folder, record=True, task="rebuilt", split="dev", **maps)
+        record = load_result(folder).records[DETOUR]
+        pose = load_trajectories(folder / TRAJECTORIES)[DETOUR].pose
+    path = maze.point(np.array(path_through_walls(older.walls, record.start, record.goal)))
+    rows, columns = np.nonzero(~older.walls)
+    left, right = (maze.cell_size * x for x in (columns.min() - 1, columns.max() + 2))
+    bottom, top = (maze.cell_size * (maze.size - y) for y in (rows.max() + 2, rows.min() - 1))
+
+    metres = f"{record.path_length:.0f} m instead of {record.shortest_path:.0f} m"
+    for (theme, look), (form, num_columns) in itertools.product(THEMES.items(), {"": 2, "-narrow": 1}.items()):
+        figure = Figure(figsize=(3.6 * num_columns, 5.9 / num_columns), layout="constrained", facecolor=look["page"])
+        panels = figure.subplots(2 // num_columns, num_columns)
+        titles = "The old map, and the path on it", f"The building today: {metres}"
+        for axes, title, walls in zip(panels, titles, (older.walls, maze.walls), strict=True):
+            cells = np.where(walls, look["wall"], look["floor"])
+            if walls is maze.walls:
+                cells = np.where(walls & ~older.walls, DRIVEN, cells)
+            colors_of_cells = np.array([list(bytes.fromhex(each[1:])) for each in cells.flat], dtype=np.uint8)
+            axes.imshow(colors_of_cells.reshape(*walls.shape, 3), extent=2 * (0, maze.side), interpolation="nearest")
+            axes.plot(*path.T, "--", color=look["path"], lw=1.8, label="shortest path on the old map")
+            axes.set_title(title, fontsize=9, loc="left", color=look["text"])
+            axes.set(xlim=(left, right), ylim=(bottom, top))
+            axes.set_axis_off()
+        panels[1].plot(*pose[:, :2].T, color="#e8871e", lw=1.8, label="the robot's way")
+        panels[1].plot([], [], "s", color=DRIVEN, label="closed since")
+        for axes in panels:
+            for label, place, shade in (("start", record.start, colors.START), ("goal", record.goal, colors.GOAL)):
+                axes.plot(*maze.point(np.array(place)), "o", color=shade, ms=6, label=label, zorder=5)
+        handles, labels = panels[1].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=5 if num_columns == 2 else 2, frameon=False,
+                      fontsize=8, labelcolor=look["text"], handlelength=1.6, columnspacing=1.2)  # fmt: skip
+        (FOLDER / f"old-map{theme}{form}.svg").write_bytes(to_svg(figure))
+
+
+def draw_formats() -> None:
+    """Draws a small maze in each format that is read, as its file looks and as it is read."""
+    with tempfile.TemporaryDirectory() as name:
+        files = _files_of_formats(pathlib.Path(name))
+        for form, columns in {"": 3, "-narrow": 1}.items():
+            rows = -(-len(files) // columns)
+            figure = Figure(figsize=(3.2 * columns, 1.75 * rows), layout="constrained")
+            panels = figure.subplots(rows, 2 * columns).reshape(-1, 2)
+            for (on_file, on_maze), (title, (path, options)) in zip(panels, files.items(), strict=False):
+                on_file.set_title(title, fontsize=8, loc="left")
+                picture = path.with_suffix(".pgm") if path.suffix == ".yaml" else path
+                if picture.suffix in (".png", ".pgm"):
+                    on_file.imshow(np.asarray(Image.open(picture).convert("L")), cmap="gray", vmin=0, vmax=255)
+                elif path.suffix == ".npy":
+                    on_file.text(0, 1, str(np.load(path).astype(int)).replace(" ", NO_BREAK), **_TEXT_OF_FILE)
+                else:
+                    lines = path.read_text(encoding="utf-8").rstrip().splitlines()
+                    lines = [part for line in lines for part in textwrap.wrap(line, 27, drop_whitespace=False)]
+                    on_file.text(0, 1, "\n".join(lines).replace(" ", NO_BREAK), **_TEXT_OF_FILE)
+                maze = read_located(path, **options)[0]
+                on_maze.imshow(~maze.walls, cmap="gray", vmin=-0.25, vmax=1, interpolation="nearest")
+            for axes in panels.flat:
+                axes.set_axis_off()
+            (FOLDER / f"formats{form}.svg").write_bytes(to_svg(figure))
+
+
+def _files_of_formats(folder: pathlib.Path) -> dict[str, tuple[pathlib.Path, dict[str, Any]]]:
+    """Writes a file in each format into `folder`, and returns them with the options to read them, by title."""
+    walls = np.array([[char == "#" for char in row] for row in SMALL_MAZE.split()])
+    rows = SMALL_MAZE.split()
+    numbers = json.dumps(walls.astype(int).tolist()).replace("], ", "],\n ")
+    posts = "o---o---o---o\n|       |   |\no---o   o   o\n|           |\no   o---o   o\n|           |\no---o---o---o\n"
+    texts = {
+        "text": ("maze.txt", SMALL_MAZE),
+        "DeepMind Lab, labmaze": ("lab.txt", "*******\n*P  * *\n*** * *\n*   O *\n* *** *\n*    G*\n*******\n"),
+        "MovingAI": ("moving.map", f"type octile\nheight 7\nwidth 7\nmap\n{SMALL_MAZE.replace('#', '@')}"),
+        "D4RL": ("d4rl.txt", "\\".join(row.replace(".", "O") for row in rows)),
+        "Gymnasium-Robotics": ("robotics.json", numbers),
+        "table": ("table.csv", "".join(",".join(map(str, row)) + "\n" for row in walls.astype(int))),
+        "walls between posts": ("posts.txt", posts),
+        "plan of +, - and |": ("plan.txt", "+-----+\n|...|.|\n+-+.|.|\n|.....|\n|.--+.|\n|.....|\n+-----+\n"),
+        "JSON object": ("object.json", f'{{"grid":\n{numbers}}}'),
+    }
+    files: dict[str, tuple[pathlib.Path, dict[str, Any]]] = {}
+    for title, (name, text) in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+        files[title] = folder / name, {}
+    np.save(folder / "array.npy", walls)
+    files["NumPy"] = folder / "array.npy", {}
+
+    # A plan with thin walls, as a ROS map and as a picture with a scale.
+    plan = np.full((140, 140), 205, np.uint8)
+    plan[10:130, 10:130] = 254
+    for top, left, bottom, right in ((10, 10, 14, 130), (126, 10, 130, 130), (10, 10, 130, 14), (10, 126, 130, 130),
+                                     (10, 70, 50, 74), (66, 14, 70, 90), (90, 74, 130, 78)):  # fmt: skip
+        plan[top:bottom, left:right] = 0
+    Image.fromarray(plan).save(folder / "ros.pgm")
+    (folder / "ros.yaml").write_text(
+        "image: ros.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    files["ROS map: ros.yaml and ros.pgm"] = folder / "ros.yaml", {}
+    write_image(draw_grid(walls, 12), folder / "cells.png")
+    files["picture of cells"] = folder / "cells.png", {}
+    Image.fromarray(np.where(plan == 0, 0, 255).astype(np.uint8)).save(folder / "floor.png")
+    files["floor plan, --pixel-size 0.05"] = folder / "floor.png", {"pixel_size": 0.05}
+    return files
 
 
 def draw_tracks() -> None:
@@ -439,5 +562,14 @@ def _show(axes: Axes, picture: np.ndarray, title: str, fontsize: float = 8, **lo
 
 if __name__ == "__main__":
     of_episodes = draw_environments, draw_observation, draw_tracks, draw_kinds, draw_planner, draw_changes
-    for draw in (*of_episodes, draw_real_buildings, draw_looks, draw_shortest_paths, draw_explorer, draw_check):
+    for draw in (
+        *of_episodes,
+        draw_old_map,
+        draw_formats,
+        draw_real_buildings,
+        draw_looks,
+        draw_shortest_paths,
+        draw_explorer,
+        draw_check,
+    ):
         draw()

@@ -21,7 +21,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions, eval_options
 from mazebench.evaluation.evaluate import run_evaluation
 from mazebench.evaluation.plan import make_plan
-from mazebench.report.leaderboard import read_entries
+from mazebench.report.leaderboard import Credit, read_entries
 from mazebench.results.comparison import compare_folders
 from mazebench.results.naming import described, noise_in_words
 from mazebench.results.paper import printed_mmn
@@ -361,4 +361,4 @@ class TestResults:
         edit_records(folder, lambda record: record | {"lidar_noise": "0,0"})
         edit_task(folder, lidar_noise="0,0")
         with pytest.raises(InputError, match=r"a track, with its senses, found eval rebuilt 1 lidar noise 0,0$"):
-            read_entries([folder])
+            read_entries([folder], Credit("A. Nobody", "none", "https://example.org"))

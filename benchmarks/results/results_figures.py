@@ -18,13 +18,15 @@ from mazebench.tasks.tracks import LEVELS, STANDING
 _LOOKS = (
     "navigator", "neural-planner", "navigator without map", "planner-closed-loop", "mmn", "mah", "mah-paper", "dqn",
     "random", "navigator with the true pose", "mmn without model and search", "sb3_agent:FieldPPOAgent", "open path",
-    "blocked path",
+    "blocked path", "dagger:Student", "navigator with egocentric (look varied)",
 )  # fmt: skip
 # What lines are called where they end; others by their label.
 _NAMES = {
     "navigator without map": "without the map",
     "navigator with the true pose": "with the true pose",
     "sb3_agent:FieldPPOAgent": "PPO",
+    "dagger:Student": "imitation",
+    "navigator with egocentric (look varied)": "navigator, camera",
     "mmn without model and search": "mmn, no model and search",
 }
 
@@ -36,7 +38,12 @@ def figures(kept: Kept) -> dict[str, Figure]:
     local = dataclasses.replace(local, values=local.values[some])
     violins = kept.paper[kept.paper.agent.isin(["mmn", "mah", "planner"])]
     agents = ("navigator", "navigator without map", "navigator with the true pose")
+    best = (
+        *("navigator", "neural-planner", "navigator with egocentric (look varied)", "navigator without map"),
+        *("dagger:Student", "sb3_agent:FieldPPOAgent"),
+    )
     return {
+        "leaderboard": on_time("On-time rate by track", {agent: (agent, (False, True)) for agent in best}, kept),
         "map-worth": on_time("What the map is worth", {agent: (agent, (False, True)) for agent in agents}, kept),
         "what-fails": on_time(
             "Where the navigator is late",

@@ -47,7 +47,7 @@ ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
 PAGES = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("results", "results_full", "tracks", "baselines", "experiments", "llm")),
+    *(f"docs/{name}.md" for name in ("index", "results", "results_full", "tracks", "baselines", "experiments", "llm")),
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
     *(f"docs/environments/{name}.md" for name in (*STANDING, "doors", "local", "hierarchical")),
@@ -121,14 +121,18 @@ _REGIMES = {
     "mmn-fixed": "20 mazes, a fixed pair in each (`--pairs fixed`)",
     "mmn-one-goal": "20 mazes, one goal an episode (`num_goals=1`)",
 }
-# The rows of tables of tracks: of the one at a glance, and of the others.
+# The rows of tables of tracks: of the one at a glance, and of the others. The last row has the best of some agents.
 _GLANCE = {
     "oracle": "`oracle`: knows the building",
     "navigator": "`navigator`: a classical robot",
-    "neural-planner": "`neural-planner`: learned, plans on learned costs",
+    "neural-planner": "`neural-planner`: learned driving, hand-written localization",
     "navigator without map": "`navigator` without the map",
-    "sb3_agent:FieldPPOAgent": "PPO of Stable-Baselines3, reads distances on the map",
 }
+_UNSOLVED = "**Unsolved**: the best agent without hand-written localization"
+_NOTHING_BY_HAND = (
+    *("dagger:Student", "sb3_agent:FieldPPOAgent", "sb3_agent:FieldRecurrentPPOAgent", "sb3_agent:PPOAgent"),
+    *("sb3_agent:RecurrentPPOAgent", "sb3_her_agent:LidarHerAgent", "mah", "dqn", "map-policy-camera"),
+)
 # Learned agents, and what was trained by the same recipe with the map hidden.
 _WITHOUT_MAP = {
     "neural-planner": ("`neural-planner`", "neural-planner trained without the map"),
@@ -167,6 +171,13 @@ _REAL_SETTINGS = {
     "changed-1": "changed 1",
     "changed-2": "changed 2",
     "years": "years",
+}
+# Of the table at a glance: what a robot would know, by setting.
+_REAL_GLANCE = {
+    "right": "right map",
+    "changed-1": "old map, few changes",
+    "changed-2": "old map, many changes",
+    "lost": "right map, place unknown",
 }
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
@@ -238,9 +249,9 @@ def published(_: Kept) -> str:
     for page in PAGES[:-1]:
         text = (ROOT / page).read_text(encoding="utf-8")
         for block in _BLOCK.finditer(text):
-            first, titles = text.partition("\n")[0], re.findall(r"^##+ (.+)$", text[: block.start()], re.MULTILINE)
-            section = titles[-1] if titles else first.removeprefix("# ")
-            place = ": ".join([first.removeprefix("# "), *titles[-1:]])
+            first, *titles = re.findall(r"^#+ (.+)$", text[: block.start()], re.MULTILINE)
+            section = titles[-1] if titles else first
+            place = ": ".join([first, *titles[-1:]])
             slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", section.lower()))
             is_on_site = page.startswith("docs/")
             place = f"[{place}]({page.removeprefix('docs/')}#{slug})" if is_on_site else f"{page}: {section}"
@@ -336,6 +347,36 @@ def by_agent(agents: Mapping[str, str], metric: str, kept: Kept) -> str:
     """Returns a row for each agent, with a metric at the levels of each track."""
     rows = [[text, *_levels(kept, agent, metric)] for agent, text in agents.items()]
     return format_table(["agent", *_TRACKS], rows)
+
+
+def tracks_glance(kept: Kept) -> str:
+    """Returns on-time rates at the levels of each track, with the highest rates of `_NOTHING_BY_HAND` below."""
+    rows = [[text, *_levels(kept, agent, ON_TIME_125)] for agent, text in _GLANCE.items()]
+    rates: dict[tuple[str, int], list[float]] = {}
+    for agent in _NOTHING_BY_HAND:
+        for track, level, own in kept.on_tracks(agent):
+            rates.setdefault((track, level), []).append(own[ON_TIME_125].mean())
+    best = [" / ".join(_number(max(rates[track, level])) for level in LEVELS) for track in STANDING]
+    return format_table(["agent", *_TRACKS], [*rows, [_UNSOLVED, *best]])
+
+
+def real_glance(kept: Kept) -> str:
+    """Returns on-time rates in all real buildings, with the highest rates of `_NOTHING_BY_HAND` in the last row."""
+
+    def rate(agent: str, setting: str) -> float | None:
+        own = kept.find(agent, setting)
+        return None if own is None else own[ON_TIME_125].mean()
+
+    counts = [kept.of("navigator", setting).maze.nunique() for setting in _REAL_GLANCE]
+    header = [f"{text} ({count})" for text, count in zip(_REAL_GLANCE.values(), counts, strict=True)]
+    rows = []
+    for agent, text in _GLANCE.items():
+        if kept.find(agent, "right") is not None:
+            rates = [rate(agent, setting) for setting in _REAL_GLANCE]
+            rows.append([text, *("-" if each is None else _number(each) for each in rates)])
+    found = [[rate(agent, setting) for agent in _NOTHING_BY_HAND] for setting in _REAL_GLANCE]
+    best = [_number(max(each for each in rates if each is not None)) for rates in found]
+    return format_table(["agent", *header], [*rows, [_UNSOLVED, *best]])
 
 
 def by_track(columns: Mapping[str, tuple[str, str, Sequence[str]]], kept: Kept, head: str = "track") -> str:
@@ -559,7 +600,8 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "mah-curve": mah_curve,
     "mmn-ingredients": lambda kept: short_runs(_INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}, kept),
     "mmn-regimes": lambda kept: short_runs(_REGIMES, {}, kept),
-    "tracks-glance": lambda kept: by_agent(_GLANCE, ON_TIME_125, kept),
+    "tracks-glance": tracks_glance,
+    "real-glance": real_glance,
     "tracks-success": lambda kept: by_agent(_ROWS, "success_rate", kept),
     "tracks-on-time": lambda kept: by_agent(_ROWS, ON_TIME_125, kept),
     "tracks-on-time-2": lambda kept: by_agent(_ROWS, ON_TIME_2, kept),
