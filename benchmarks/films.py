@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import mazebench
-from benchmarks.pictures import FOLDER, MIDWAY, MOVED, ODOMETRY, PLANNED, add_legend, annotate
+from benchmarks.pictures import FOLDER, MIDWAY, MOVED, ODOMETRY, PLANNED, annotate
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.film import run_episode
@@ -28,13 +28,12 @@ from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.shown_map import show_map
 
-GAP, TITLE, LEGEND = 12, 32, 70  # pixels
+SIDE, GAP, TITLE = 300, 12, 32  # pixels; of a view, between two, and above them
 NUM_FRAMES, TIME, LAST_TIME = 75, 6000, 1500  # frames, about so many, and ms
 SHADES, ALMOST_WHITE = 64, 244  # in a film, and of 255
 TWO = {"map": "the map that is shown", "lidar": "the building"}
 OLDER = {"map": "the map of 2012", "lidar": "the building in 2013"}
 ABOVE = {"map": "the map", "top": "the maze"}
-THREE = {"map": "the map, its path dashed", "lidar": "building, lidar, path", "egocentric": "the robot's view"}
 REAL = "real:raw-industriestrasse-2013-since-2012-07"
 
 
@@ -45,28 +44,25 @@ class Film(NamedTuple):
     task: dict[str, Any]
     agent: str = "navigator"
     views: dict[str, str] = TWO  # titles
-    side: int = 300  # pixels, of a view
-    has_legend: bool = False  # or else the page says what the marks are
 
 
 FILMS = {
-    "rebuilt.gif": Film(94, {"task": "rebuilt", "level": 2, "split": "dev"}, views=THREE, side=256, has_legend=True),
-    "films/building.webp": Film(3, {"task": "building", "level": 3, "split": "dev", "distances": 35}),
-    "films/rebuilt.webp": Film(3, {"task": "rebuilt", "level": 2, "split": "dev", "distances": 35}),
-    "films/adrift.webp": Film(3, {"task": "adrift", "level": 2, "split": "dev", "distances": 27}),
-    "films/rough.webp": Film(3, {"task": "rough", "level": 2, "split": "dev", "distances": 36}),
-    "films/doors.webp": Film(8, {"task": "doors", "level": 2, "split": "dev", "distances": 36}),
-    "films/doors-around.webp": Film(7, {"task": "doors", "level": 2, "split": "dev", "distances": 36}),
-    "films/real.webp": Film(11, {"task": "building", "mazes": REAL, "shown": f"{REAL}-older"}, views=OLDER),
-    "films/local.webp": Film(4, {"distances": 15, "split": "train"}, agent="mmn", views=ABOVE),
-    "films/hierarchical.webp": Film(0, {"task": "hierarchical", "split": "train"}, agent="mmn", views=ABOVE),
+    "building": Film(3, {"task": "building", "level": 3, "split": "dev", "distances": 35}),
+    "rebuilt": Film(3, {"task": "rebuilt", "level": 2, "split": "dev", "distances": 35}),
+    "adrift": Film(3, {"task": "adrift", "level": 2, "split": "dev", "distances": 27}),
+    "rough": Film(3, {"task": "rough", "level": 2, "split": "dev", "distances": 36}),
+    "doors": Film(8, {"task": "doors", "level": 2, "split": "dev", "distances": 36}),
+    "doors-around": Film(7, {"task": "doors", "level": 2, "split": "dev", "distances": 36}),
+    "real": Film(11, {"task": "building", "mazes": REAL, "shown": f"{REAL}-older"}, views=OLDER),
+    "local": Film(4, {"distances": 15, "split": "train"}, agent="mmn", views=ABOVE),
+    "hierarchical": Film(0, {"task": "hierarchical", "split": "train"}, agent="mmn", views=ABOVE),
 }
 
 
 def film(name: str, chosen: Film) -> None:
     """Films an episode, with the path on the map and marks at the doors that have moved."""
     plan = make_plan(eval_options(chosen.agent, **chosen.task))
-    views = [run_episode(plan, chosen.number, view, chosen.side, is_film=True) for view in chosen.views]
+    views = [run_episode(plan, chosen.number, view, SIDE, is_film=True) for view in chosen.views]
     moments = list(zip(*(frames for frames, _ in views), strict=True))
     marks, places = _marks(plan, chosen)
     frames = []
@@ -85,10 +81,9 @@ def film(name: str, chosen: Film) -> None:
     palette.putpalette([255 if value > ALMOST_WHITE else value for value in palette.getpalette() or ()])
     first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     durations = [TIME // len(rest)] * len(rest) + [LAST_TIME]
-    path = FOLDER / name
+    path = FOLDER / "films" / f"{name}.webp"
     path.parent.mkdir(exist_ok=True)
-    look = {"optimize": True} if path.suffix == ".gif" else {"lossless": True, "method": 6}
-    first.save(path, save_all=True, append_images=rest, duration=durations, loop=0, **look)
+    first.save(path, save_all=True, append_images=rest, duration=durations, loop=0, lossless=True, method=6)
     print(f"{name}: {path.stat().st_size / 1000:.0f} kB, {len(frames)} frames; {views[0][1].words}")
 
 
@@ -96,16 +91,16 @@ def _marks(plan: Plan, chosen: Film) -> tuple[Image.Image, list[tuple[int, int]]
     """Returns what all frames have before them, on a transparent ground, and the upper left corners of the views."""
     episode = plan.trials[chosen.number].episode
     maze, seen = plan.task.mazes[episode.maze], show_map(plan.task, episode)
-    side, count = chosen.side, len(chosen.views)
-    width, height = count * (side + GAP) + GAP, TITLE + side + (LEGEND if chosen.has_legend else GAP)
+    count = len(chosen.views)
+    width, height = count * (SIDE + GAP) + GAP, TITLE + SIDE + GAP
     figure = Figure(figsize=(width / 100, height / 100))
-    places = [(GAP + index * (side + GAP), TITLE) for index in range(count)]
-    panels = [figure.add_axes((x / width, 1 - (TITLE + side) / height, side / width, side / height)) for x, _ in places]
-    for axes, title, walls in zip(panels, chosen.views.values(), (seen.seen_walls, *[maze.walls] * 2), strict=False):
+    places = [(GAP + index * (SIDE + GAP), TITLE) for index in range(count)]
+    panels = [figure.add_axes((x / width, 1 - (TITLE + SIDE) / height, SIDE / width, SIDE / height)) for x, _ in places]
+    for axes, title, walls in zip(panels, chosen.views.values(), (seen.seen_walls, maze.walls), strict=True):
         axes.set_title(title, fontsize=14)
         axes.set_axis_off()
         _frame(axes, walls)
-    annotate(*panels[:2], maze, seen, episode.start, episode.goal, has_doors=plan.task.options.track != "building")
+    annotate(*panels, maze, seen, episode.start, episode.goal, has_doors=plan.task.options.track != "building")
     if plan.task.options.track in ("adrift", "rough", "doors"):
         with tempfile.TemporaryDirectory() as name:
             mazebench.evaluate(chosen.agent, out=name, record=True, **chosen.task)
@@ -116,8 +111,6 @@ def _marks(plan: Plan, chosen: Film) -> tuple[Image.Image, list[tuple[int, int]]
         for top, left, *_ in record.model_dump().get("doors", ()):
             for axes in panels:
                 axes.plot(left + 0.5, maze.size - top - 0.5, "s", color=MOVED, ms=11, mew=2, fillstyle="none")
-    if chosen.has_legend:
-        add_legend(figure)
     figure.savefig(file := io.BytesIO(), transparent=True, dpi=100)
     return Image.open(file), places
 
