@@ -122,8 +122,8 @@ def first_training(kept: Kept) -> Figure:
     kept.read.add("training/first-training")
     by_steps, panels = lines.groupby(lines.env_steps // 1000), []
     for title, name in (
-        ("goals reached while it learns", "success"),
-        ("states in which it chooses the oracle's action", "agreement"),
+        ("goals reached in training", "success"),
+        ("the oracle's action chosen", "agreement"),
     ):
         points = by_steps[name].agg(value="mean", low95="min", high95="max").rename_axis("x").reset_index()
         points = points.assign(column="neural-planner")
