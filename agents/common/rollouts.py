@@ -88,7 +88,10 @@ class RolloutLearner(NetworkLearner):
         num_gradients = max(1, (total or 0) // self.steps_per_update) * config.epochs * config.minibatches
         descent = Descent(
             actor.network,
-            torch.optim.Adam(actor.network.parameters(), lr=config.learning_rate),
+            torch.optim.Adam(
+                [{"params": [each], "rate": actor.rate(name)} for name, each in actor.network.named_parameters()],
+                lr=config.learning_rate,
+            ),
             max_gradient_norm=config.max_gradient_norm,
             # Constant in the first half of the run, then falling to nearly 0.
             rate=lambda step: min(

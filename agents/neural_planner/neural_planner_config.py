@@ -20,6 +20,7 @@ class NeuralPlannerConfig(ImitationConfig):
     teacher: Literal["reward", "oracle"] = "oracle"
     num_envs: Count = 40  # 80 make half as many updates of the same steps, too few in a run of some minutes
     learning_rate: Factor = 1e-3
+    cost_rate: Factor = 3.0  # of the learning rate, for the costs of cells: at 1, walls stay cheap for long
     minibatches: Length = 16
 
     # Network
