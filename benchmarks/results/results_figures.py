@@ -117,7 +117,7 @@ def model_and_search(kept: Kept) -> Figure:
 
 
 def first_training(kept: Kept) -> Figure:
-    """Returns what the first training of the documentation logs: means, lowest and highest values over its runs."""
+    """Returns what the first training of docs/training.md logs: means, lowest and highest values over its runs."""
     lines = pd.concat(kept.training["first-training"])
     kept.read.add("training/first-training")
     by_steps, panels = lines.groupby(lines.env_steps // 1000), []
@@ -128,7 +128,7 @@ def first_training(kept: Kept) -> Figure:
         points = by_steps[name].agg(value="mean", low95="min", high95="max").rename_axis("x").reset_index()
         points = points.assign(column="neural-planner")
         panels.append(Panel(title, "thousand agent steps", points, {x: f"{x}" for x in range(0, 61, 20)}, True))
-    return _figure("The first training: mean, lowest and highest of three runs", panels, "share")
+    return _figure("The first training", panels, "share")
 
 
 def _figure(title: str, panels: Sequence[Panel], y_name: str = "success rate") -> Figure:
