@@ -126,6 +126,7 @@ def test_the_checkpoint_that_ships_does_what_the_oracle_does():
 def run(out, env_steps, resume=False):
     """A training with a milestone every 80 steps, which are two rollouts; returns its last checkpoint."""
     values = {"num_envs": 8, "rollout_steps": 5, "epochs": 1, "minibatches": 2, "kept_rollouts": 3}
+    values |= {"total_steps": 160}
     options = {"overrides": values, "checkpoint_steps": 80, "eval_mazes": 1, "distances": 15}
     train("map-policy", "building", out=out, env_steps=env_steps, resume=resume, **options)
     return max((out / "checkpoints").iterdir())

@@ -159,7 +159,8 @@ GROWING = {"distances": (1, 2, 3, 4, 5), "first_distance": 2, "widen_steps": 100
 
 def run(out, env_steps, resume=False, teacher="reward", **options):
     """A training with a milestone every 320 steps, which are a rollout; returns its last checkpoint."""
-    values = {"overrides": SMALL | {"teacher": teacher}, "checkpoint_steps": 320, "eval_mazes": 1}
+    overrides = SMALL | {"teacher": teacher, "total_steps": 1000}
+    values = {"overrides": overrides, "checkpoint_steps": 320, "eval_mazes": 1}
     train("neural-planner", out=out, env_steps=env_steps, resume=resume, **values, **options)
     return max((out / "checkpoints").iterdir())
 
@@ -191,6 +192,46 @@ def test_metrics_and_config_of_several_tracks(tmp_path):
     config = json.loads((tmp_path / "whole" / "config.json").read_text())
     assert config["also"] == ["rebuilt"]
     assert config["first_distance"] == 2
+
+
+def test_the_learning_rate_falls_with_the_run(tmp_path):
+    """It is whole at half of the run, and 2 % at its end, however long that is."""
+    task = Task.of(mazes=field(7), distances=(2,), sensors="lidar")
+    learner = NeuralPlanner.build_learner(task, overrides=text(SMALL))
+    optimizer = learner.descent._optimizer
+    for share, factor in ((0.5, 1.0), (0.75, 0.5), (1.0, 0.02)):
+        learner.share_done = share
+        learner.descent.step(sum(parameter.sum() for parameter in learner.actor.network.parameters()))
+        rates = [group["lr"] for group in optimizer.param_groups]
+        assert (min(rates), max(rates)) == pytest.approx((1e-3 * factor, 3e-3 * factor))  # those of costs are higher
+
+
+def config_of(out, **options):
+    """The config of a training that ends in its first step."""
+
+    def end(status):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train("neural-planner", "building", out=out, env_steps=8, eval_mazes=1, progress=end, **options)
+    config = json.loads((out / "config.json").read_text())
+    task, agent = config["task"], config["agent_config"]
+    distances = task["distances"][0], task["distances"][-1], config.get("first_distance")
+    return task["fresh"], task["kinds"], *distances, *(agent[name] for name in FORMER)
+
+
+FORMER = {"teacher": "reward", "num_envs": 80, "learning_rate": 7e-4, "minibatches": 8, "total_steps": 1_000_000}
+FORMER |= {"cost_rate": 1.0}
+
+
+def test_by_default_a_training_on_a_track_imitates_the_oracle_in_fresh_mazes_with_near_goals_first(tmp_path):
+    kinds = ["dfs", "house", "rooms"]
+    assert config_of(tmp_path) == (True, kinds, 1, 40, 8, "oracle", 40, 1e-3, 16, None, 3.0)
+
+
+def test_the_former_defaults_can_be_named(tmp_path):
+    options = {"fresh": False, "distances": range(15, 41), "first_distance": 0, "overrides": FORMER}
+    assert config_of(tmp_path, **options) == (False, [], 15, 40, None, *FORMER.values())
 
 
 def test_other_agents_learn_one_task_at_a_time(tmp_path):
@@ -227,7 +268,9 @@ def test_damaged_rollouts_are_refused(tmp_path, content):
 def test_goals_get_farther_as_the_run_goes_on():
     task = Task.of(mazes=field(7), distances=(2, 4, 6))
     options = TrainOptions(agent="neural-planner", minutes=1, first_distance=3, widen_steps=300)
-    assert [longest_distance(options, [task], steps) for steps in (0, 100, 299, 300, 10**6)] == [3, 4, 5, 6, 6]
+    assert [longest_distance(options, [task], steps, 0) for steps in (0, 100, 299, 300, 10**6)] == [3, 4, 5, 6, 6]
+    of_run = options.replace(widen_steps=None)
+    assert [longest_distance(of_run, [task], 0, share) for share in (0, 0.14, 0.39, 0.4, 1)] == [3, 4, 5, 6, 6]
     learner = NeuralPlanner.build_learner(task, overrides=text(SMALL))
     collector = Collector(task, 16)
 

@@ -5,6 +5,7 @@ import json
 import logging
 import math
 import pathlib
+import shlex
 import shutil
 import signal
 import subprocess
@@ -233,6 +234,37 @@ def test_minutes_limit_a_command(tmp_path):
     train(**tiny_options(minutes=0.02, checkpoint_steps=10**9), out=tmp_path)
     assert time.monotonic() - begin < 60  # far from endless; no measure of speed
     assert metrics(tmp_path)[-1]["env_steps"] > 0
+
+
+def test_the_share_of_a_run_counts_the_commands_before():
+    """The second command makes 1,000 steps after 500: halfway, 1,000 of 1,500 are made."""
+    assert loop.share_of_run(500, 0, 0.5) == 0.5
+    assert loop.share_of_run(1000, 500, 0.5) == pytest.approx(2 / 3)
+    assert loop.share_of_run(1500, 500, 1.0) == 1
+    assert loop.share_of_run(0, 0, 0.0) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--track", "rebuilt", "--level", "2,3"), "--track rebuilt --level {} --split dev"),
+        (("--size", "15", "--map-flip", "0.1", "--distances", "2"), "--size 15 --distances 2 --map-flip 0.1"),
+    ],
+    ids=("track", "local"),
+)
+def test_train_prints_the_evaluation_of_what_it_trained(command, options, words):
+    values = [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
+    status, printed, _ = command(
+        "train", "--agent", "mah", "--env-steps", "8", "--eval-mazes", "1", "--out", "a run", *values, *options
+    )
+    lines = [line for line in printed.splitlines() if line.startswith("mazebench eval")]
+    levels = (2, 3) if "--track" in options else (0,)
+    start = "mazebench eval --agent mah --checkpoint 'a run' "
+    assert (status, lines) == (0, [start + words.format(level) for level in levels])
+    status, printed, _ = command(*shlex.split(lines[0])[1:])
+    assert status == 0
+    assert ("mah: rebuilt 2, dev mazes 31 x 31" in printed) == ("--track" in options)
+    assert printed.startswith("evaluating in the eval mazes of the paper's protocol") == ("--size" in options)
 
 
 def collect(actor, num_steps, **options):

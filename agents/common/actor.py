@@ -138,6 +138,10 @@ class NetworkAgent(LearningAgent):
         self._noise_scale = 1.0 - rung
         self._rng = np.random.default_rng(seed)
 
+    def rate(self, parameter: str) -> float:
+        """Returns the factor of the learning rate for a parameter of the network, by its name."""
+        return 1.0
+
     def save(self, path: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes the checkpoint that `build` reads."""
         metadata = {

@@ -30,6 +30,7 @@ class NetworkLearner:
     """The parts of every learner: an actor, gradient steps of its network, and a random stream."""
 
     drive_steps = 0
+    share_done = 0.0
 
     def __init__(self, actor: NetworkAgent, seed: int, descent: Descent):
         """`descent` is of the actor's network."""

@@ -31,9 +31,8 @@ class RolloutConfig(Options):
     # Experience
     num_envs: Count = 80  # side by side
     rollout_steps: Length = 50  # in each between two updates; the default milestones then end rollouts, too
-    total_steps: config_values.Rows = (
-        1_000_000  # of the environment; over the second half, the learning rate falls to 2 %
-    )
+    # Of the environment; over the second half, the learning rate falls to 2 %. None: those of the run.
+    total_steps: config_values.Rows | None = None
 
     # Learning
     epochs: Length = 3  # an update has as many minibatches as so many passes over the newest rollout
@@ -85,13 +84,19 @@ class RolloutLearner(NetworkLearner):
         """The actor's config has the fields of `RolloutConfig`."""
         config = self._config = actor.config
         self.steps_per_update: int = config.num_envs * config.rollout_steps
-        num_gradients = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
+        total = config.total_steps
+        num_gradients = max(1, (total or 0) // self.steps_per_update) * config.epochs * config.minibatches
         descent = Descent(
             actor.network,
-            torch.optim.Adam(actor.network.parameters(), lr=config.learning_rate),
+            torch.optim.Adam(
+                [{"params": [each], "rate": actor.rate(name)} for name, each in actor.network.named_parameters()],
+                lr=config.learning_rate,
+            ),
             max_gradient_norm=config.max_gradient_norm,
             # Constant in the first half of the run, then falling to nearly 0.
-            rate=lambda step: min(1.0, max(_LEAST_RATE, 2 - 2 * step / num_gradients)),
+            rate=lambda step: min(
+                1.0, max(_LEAST_RATE, 2 - 2 * (self.share_done if total is None else step / num_gradients))
+            ),
         )
         super().__init__(actor, seed, descent)
         self._steps: list[_Step] = []  # of the rollout that is under way, oldest first

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from ..common.config_values import Count, Factor, Length, Rows, Share
+from ..common.config_values import Count, Factor, Length, Share
 from ..imitation import DriveSteps, ImitationConfig
 
 
@@ -17,7 +17,6 @@ class MapPolicyConfig(ImitationConfig):
     drive_steps: DriveSteps = 25  # as many as a rollout has, so that each map has a row of states in it
     num_envs: Count = 64
     rollout_steps: Length = 25  # a map is read once for as many steps; the default milestones end rollouts
-    total_steps: Rows = 80_000
     epochs: Length = 5  # a step is learned from in so many minibatches, of some 16 maps each
     minibatches: Length = 4
     learning_rate: Factor = 1e-3

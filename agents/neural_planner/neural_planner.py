@@ -86,6 +86,10 @@ class NeuralPlanner(ImitatingAgent):
         agent._senses, agent._cell_size = Senses(interface, self.name), interface.cell_size
         return agent
 
+    def rate(self, parameter: str) -> float:
+        """Returns that of the config for the costs of cells."""
+        return self.config.cost_rate if parameter.startswith("costs.") else 1.0
+
     def explore_from(self, seed: int) -> None:
         """Begins a new stream of exploration."""
         self._rng = np.random.default_rng([seed, 0])

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval
 
-from ..common.config_values import Ahead, Factor, Length, Share, Size
+from ..common.config_values import Ahead, Count, Factor, Length, Share, Size
 from ..imitation import ImitationConfig
 
 
@@ -15,9 +15,13 @@ from ..imitation import ImitationConfig
 class NeuralPlannerConfig(ImitationConfig):
     """Sized for one core: a million steps in less than an hour."""
 
-    # Who teaches: "reward", by PPO (Schulman et al. 2017), or "oracle", by imitation of the oracle's look-ahead in the
-    # states that the agent itself drives into (DAgger: Ross et al. 2011).
-    teacher: Literal["reward", "oracle"] = "reward"
+    # Who teaches: "oracle", by imitation of its look-ahead in the states that the agent itself drives into (DAgger:
+    # Ross et al. 2011), or "reward", by PPO (Schulman et al. 2017).
+    teacher: Literal["reward", "oracle"] = "oracle"
+    num_envs: Count = 40  # 80 make half as many updates of the same steps, too few in a run of some minutes
+    learning_rate: Factor = 1e-3
+    cost_rate: Factor = 3.0  # of the learning rate, for the costs of cells: at 1, walls stay cheap for long
+    minibatches: Length = 16
 
     # Network
     channels: Size = 16  # of the convolutions that give cells their costs

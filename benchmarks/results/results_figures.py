@@ -53,6 +53,7 @@ def figures(kept: Kept) -> dict[str, Figure]:
         "budget": budget(kept),
         "wrong-maps": wrong_maps(kept),
         "model-and-search": model_and_search(kept),
+        "first-training": first_training(kept),
         LOCAL: draw_table(local, _LOOKS),
         **{drawn.name: drawn.figure for drawn in [*draw_violins(violins), *draw_paths(kept.paths)]},
     }
@@ -120,6 +121,21 @@ def model_and_search(kept: Kept) -> Figure:
         panels.append(Panel(f"{distance} cells", "million agent steps", points, ticks))
     title = "Success rate on held-out mazes over training: mean, lowest and highest run"
     return _figure(title, panels)
+
+
+def first_training(kept: Kept) -> Figure:
+    """Returns what the first training of docs/training.md logs: means, lowest and highest values over its runs."""
+    lines = pd.concat(kept.training["first-training"])
+    kept.read.add("training/first-training")
+    by_steps, panels = lines.groupby(lines.env_steps // 1000), []
+    for title, name in (
+        ("goals reached in training", "success"),
+        ("the oracle's action chosen", "agreement"),
+    ):
+        points = by_steps[name].agg(value="mean", low95="min", high95="max").rename_axis("x").reset_index()
+        points = points.assign(column="neural-planner")
+        panels.append(Panel(title, "thousand agent steps", points, {x: f"{x}" for x in range(0, 61, 20)}, True))
+    return _figure("The first training", panels, "share")
 
 
 def _figure(title: str, panels: Sequence[Panel], y_name: str = "success rate") -> Figure:

@@ -90,6 +90,8 @@ if __name__ == "__main__":
         "building",
         kinds=("dfs", "house", "rooms"),
         fresh=True,
+        distances=range(15, 41),
+        first_distance=0,
         env_steps=arguments.steps,
         seed=arguments.seed,
         out=arguments.out,

@@ -80,6 +80,9 @@ def evaluate(
 
     task = TaskOptions(**options_in(values, TaskOptions))
     options = EvalOptions(agent=agents[0], task=task, **options_in(values, EvalOptions))
+    is_of_paper = suite is None and task.track is None and task.mazes is None and not task.is_drawn
+    if is_of_paper and task.split in (None, "eval"):
+        print("evaluating in the eval mazes of the paper's protocol, which has no dev split; tracks have one (--track)")
     title = f"{agents[0]}, {task.task}" if suite is None else f"{suite}, {', '.join(agents)}"
     name = suite or f"{agents[0].replace(':', '-')}-{task.task}"
     folder = out or progress.new_folder(name)

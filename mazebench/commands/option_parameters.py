@@ -77,6 +77,15 @@ def watched_task(values: Mapping[str, Any]) -> Task:
     return task.replace(distances=(min(task.distances, key=lambda distance: abs(distance - 10)),))
 
 
+def words_of(values: Mapping[str, Any]) -> list[str]:
+    """Returns the words of a command line that give options some values, none of which is False."""
+    words = []
+    for name, value in values.items():
+        text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+        words += [f"--{name.replace('_', '-')}", *([] if value is True else [text])]
+    return words
+
+
 def parse_numbers(name: str, text: str, least: int = 1) -> tuple[int, ...]:
     """Returns sorted numbers from ranges and commas, as "1-5,8,10"; `name` is the option's, for messages."""
     numbers: set[int] = set()

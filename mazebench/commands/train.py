@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import pathlib
+import shlex
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import typer
@@ -11,12 +14,15 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import parse_numbers, takes_options
+from mazebench.commands.option_parameters import parse_numbers, takes_options, words_of
 from mazebench.errors import InputError
 from mazebench.evaluation.eval_options import read_cluster
-from mazebench.maps.benchmark import SIZES
+from mazebench.maps.benchmark import DEV, KINDS_SIZE, SIZES
+from mazebench.maps.kinds import KNOWN
 from mazebench.options import options_in
-from mazebench.tasks.task_options import LOCAL, TaskOptions
+from mazebench.tasks.task import NOT_IN_EVALUATIONS
+from mazebench.tasks.task_options import DRAWN_KINDS, LOCAL, TaskOptions
+from mazebench.tasks.tracks import LEVELS
 from mazebench.training.train_options import FIXED, TrainOptions
 
 
@@ -76,11 +82,27 @@ def train(
             with RayExecutor(cluster) if cluster else contextlib.nullcontext() as executor:
                 train_seeds(options, asked, folders, resume, executor, show)
     for each in folders.values() or [folder]:
-        print(f"run in {each}; evaluate it by: mazebench eval --agent {agent} --checkpoint {each}")
+        print(f"run in {each}; evaluate it by:")
+        for words in _evaluations(options, task_options):
+            print(shlex.join(["mazebench", "eval", "--agent", agent, "--checkpoint", str(each), *words]))
+
+
+def _evaluations(options: TrainOptions, chosen: dict[str, Any]) -> Iterator[list[str]]:
+    """Yields the words of `mazebench eval` for each track and level that was trained on, in frozen mazes if it can."""
+    is_on_track = options.task != (LOCAL,)
+    if "mazes" not in chosen and (is_on_track or {"num_mazes", "fresh"} & chosen.keys()):
+        chosen = {"kinds": KNOWN if is_on_track else DRAWN_KINDS[:1], **chosen}  # those that are trained in
+    is_frozen = is_on_track and "mazes" not in chosen and chosen.get("size", KINDS_SIZE) == KINDS_SIZE
+    is_frozen = is_frozen and set(chosen["kinds"]) <= set(KNOWN)
+    left_out = {"level", "num_mazes", *NOT_IN_EVALUATIONS, *(("kinds", "distances") if is_frozen else ())}
+    words = words_of({name: value for name, value in chosen.items() if name not in left_out})
+    for track, level in itertools.product(options.task, chosen.get("level", LEVELS[:1])):
+        of_track = [] if track == LOCAL else ["--track", track, "--level", str(level)]
+        yield [*of_track, *(["--split", DEV] if is_frozen else []), *words]
 
 
 def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:
-    parts = [options.agent.replace(":", "-"), *values.get("kinds", ()), *(["fresh"] if "fresh" in values else [])]
+    parts = [options.agent.replace(":", "-"), *values.get("kinds", ()), *(["fresh"] if values.get("fresh") else [])]
     if "mazes" in values:
         parts.append(pathlib.Path(values["mazes"]).stem)
     levels = map(str, values.get("level", (1,)))

@@ -251,6 +251,7 @@ def resolve(
         actions=asked.actions or "six",
         context_size=context_size,
         kinds=asked.kinds or (DRAWN_KINDS[:1] if asked.is_drawn else ()),
+        fresh=bool(asked.fresh),
         num_mazes=asked.num_mazes or (NUM_DRAWN if asked.is_drawn and not asked.fresh else None),
     )
     return Task(filled, arena, context_size)

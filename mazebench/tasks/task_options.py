@@ -126,7 +126,13 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         ),
     ] = ()
     num_mazes: Annotated[int | None, Ge(1), Doc(f"Generated mazes of each kind; {NUM_DRAWN} if not given.")] = None
-    fresh: Annotated[bool, Doc("Every episode has a new maze, of one of the kinds (not in an evaluation).")] = False
+    fresh: Annotated[
+        bool | None,
+        Doc(
+            "Every episode has a new maze, of one of the kinds (not in an evaluation). If not given, no, but in a "
+            f"training on a track yes, of the kinds {', '.join(KNOWN)}, unless mazes or num_mazes are given."
+        ),
+    ] = None
     level: Annotated[
         tuple[Annotated[int, Interval(ge=LEVELS[0], le=LEVELS[-1])], ...] | None,
         Doc(
@@ -138,8 +144,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         tuple[Annotated[int, Ge(1)], ...] | None,
         Doc(
             "Cells from start to goal, as 1-5,8,10; metres on a track (not in the hierarchical task). If not given: "
-            "15-40 on a track; in the local task 1-5 for training and 1-15 for evaluation; in mazes of your own as far "
-            "as they reach."
+            "15-40 on a track, and 1-40 to train there; in the local task 1-5 for training and 1-15 for evaluation; in "
+            "mazes of your own as far as they reach."
         ),
     ] = None
     start: Annotated[

@@ -24,6 +24,7 @@ from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of, sensors_of, unread_sensors
 from mazebench.evaluation.provenance import code_hash
+from mazebench.maps.kinds import KNOWN
 from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
 from mazebench.tasks.task import Task, as_asked, in_the_same_mazes, options_of, resolve
@@ -33,7 +34,7 @@ from mazebench.training.counters import Counters
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, checkpoints, read_counters
-from mazebench.training.train_options import FIXED, TrainOptions
+from mazebench.training.train_options import FIXED, NEAR, WIDEN_SHARE, TrainOptions
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
 # lines.
@@ -130,8 +131,11 @@ def run_training(
     if len(options.task) > 1 and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.task)}")
     defaults = agent_class.task_options(options.overrides)
+    asked = with_fresh_mazes(asked)
     wanted = [asked, *(asked.replace(task=name) for name in options.task[1:])]
     tasks = tuple(training_task(options.agent, agent_class, defaults, each) for each in wanted)
+    if options.first_distance is None and isinstance(asked, TaskOptions) and asked.track is not None:
+        options = options.replace(first_distance=NEAR if _farthest(tasks) > NEAR else 0)
     _check_together(options, tasks)
     held_out = [HeldOutEvaluation(task, options.eval_mazes, options_of(asked).distances or ()) for task in tasks]
     tasks = in_the_same_mazes(tasks)
@@ -203,8 +207,9 @@ class TrainingLoop:
                 self._folder.log(self._counters, self._counters.mean_losses())
                 self._counters = self._counters.after_line()
             # Where goals are near in the beginning, they are farther as the run goes on.
-            if self._options.first_distance is not None:
-                longest = longest_distance(self._options, self._tasks, self._counters.env_steps)
+            if self._options.first_distance:
+                so_far = self._counters.env_steps, self._share_of_run()
+                longest = longest_distance(self._options, self._tasks, *so_far)
                 if longest != self._longest:
                     self._longest = longest
                     self._collector.limit_distances(longest)
@@ -215,6 +220,7 @@ class TrainingLoop:
             num_steps = self._counters.env_steps + len(experience.action)
             self._counters = dataclasses.replace(self._counters, env_steps=num_steps)
             for _ in range(num_updates_due(self._learner, num_steps) - self._counters.updates):
+                self._learner.share_done = self._share_of_run()
                 losses = self._learner.update()
                 self._counters = self._counters.after_update(losses)
                 for name, value in losses.items():
@@ -232,10 +238,19 @@ class TrainingLoop:
 
     def _share_done(self) -> float:
         """Returns the share of the time, or of the steps, that is up, from 0 to 1."""
-        minutes, env_steps = self._options.minutes, self._options.env_steps
-        of_time = 0.0 if minutes is None else (time.monotonic() - self._first_time) / (60 * minutes)
-        of_steps = 0.0 if env_steps is None else self._counters.env_steps / env_steps
-        return min(1.0, max(of_time, of_steps))
+        return min(1.0, max(self._share_of_time(), self._share_of_steps()))
+
+    def _share_of_time(self) -> float:
+        minutes = self._options.minutes
+        return 0.0 if minutes is None else (time.monotonic() - self._first_time) / (60 * minutes)
+
+    def _share_of_steps(self) -> float:
+        env_steps = self._options.env_steps
+        return 0.0 if env_steps is None else self._counters.env_steps / env_steps
+
+    def _share_of_run(self) -> float:
+        of_time = share_of_run(self._counters.env_steps, self._first_steps, self._share_of_time())
+        return min(1.0, max(of_time, self._share_of_steps()))
 
     def _status(self, evaluated: tuple[int, int] | None = None) -> Status:
         speed = (self._counters.env_steps - self._first_steps) / (time.monotonic() - self._first_time)
@@ -286,22 +301,44 @@ def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
     """Checks that tasks of several are tracks, and that goals can begin near."""
     if len(tasks) > 1 and any(task.options.track is None for task in tasks):
         raise InputError(f"expected different tracks, found {', '.join(options.task)}")
-    if options.first_distance is None:
+    if not options.first_distance:
         return
     chosen = [task.options for task in tasks]
     if any(each.num_ends or each.pairs == "fixed" or each.is_hierarchical for each in chosen):
         raise InputError("--first-distance: expected starts and goals that are drawn, found given ones")
-    if options.first_distance > (farthest := max(max(task.options.distances or ()) for task in tasks)):
+    if options.first_distance > (farthest := _farthest(tasks)):
         raise InputError(f"expected --first-distance of at most {farthest}, the farthest goals, found more")
 
 
-def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: int) -> int:
-    """Returns how far goals are away at most after `env_steps` agent steps, where that grows with them.
+def share_of_run(env_steps: int, first_steps: int, of_time: float) -> float:
+    """Returns the share of a run that is done when a share of the time of its last command is up.
+
+    `first_steps` of the `env_steps` were made by the commands before it; the rest of the time makes steps as fast.
+    """
+    expected = first_steps + (env_steps - first_steps) / of_time if of_time else math.inf
+    return env_steps / max(1, expected)
+
+
+def _farthest(tasks: Sequence[Task]) -> int:
+    return max(max(task.options.distances or ()) for task in tasks)
+
+
+def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: int, share: float) -> int:
+    """Returns how far goals are away at most after `env_steps` agent steps, a share of the run, where that grows.
 
     It is counted as the option `distances` is: on a track in metres, else in cells.
     """
-    first, last = options.first_distance or 1, max(max(task.options.distances or ()) for task in tasks)
-    return max(first, min(last, first + int((last - first) * env_steps / options.widen_steps)))
+    first, last = options.first_distance or 1, _farthest(tasks)
+    grown = share / WIDEN_SHARE if options.widen_steps is None else env_steps / options.widen_steps
+    return max(first, min(last, first + int((last - first) * grown)))
+
+
+def with_fresh_mazes(asked: TaskOptions | Task) -> TaskOptions | Task:
+    """Returns what is asked for in fresh mazes, if it is options of a track that leave open which mazes are played."""
+    if isinstance(asked, Task) or asked.track is None or asked.mazes is not None or asked.num_mazes is not None:
+        return asked
+    fresh = asked.fresh is not False
+    return asked.replace(fresh=fresh, kinds=asked.kinds or (KNOWN if fresh else ()))
 
 
 def training_task(
@@ -324,6 +361,8 @@ def training_task(
         left_open["sensors"] = sensors_of(agent_class, options.sensors)
     asked = asked.replace(**left_open | one_goal)
     task = resolve(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
+    if isinstance(asked, TaskOptions) and asked.track is not None and asked.distances is None:
+        task = task.replace(distances=range(1, max(task.options.distances or ()) + 1))  # nearer ones than evaluations
     if needed := [name for name in agent_class.needs_shown if name in task.options.hide]:
         raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")
     if unread := unread_sensors(agent, agent_class, task.options):
@@ -352,6 +391,6 @@ def _origin(options: TrainOptions, tasks: Sequence[Task]) -> dict[str, Any]:
     origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
     if others:
         origin["also"] = [other.options.task for other in others]
-    if options.first_distance is not None:
+    if options.first_distance:
         origin |= {"first_distance": options.first_distance, "widen_steps": options.widen_steps}
     return origin

@@ -74,6 +74,8 @@ class LearningAgent(Agent):
 class Learner(Protocol):
     """The contract of agents that learn, besides acting."""
 
+    share_done: float  # of the run, from 0 to 1: the training loop sets it before each update, for schedules
+
     @property
     def num_envs(self) -> int:
         """B."""

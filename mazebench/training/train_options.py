@@ -14,6 +14,8 @@ from mazebench.tasks.tracks import TRACKS
 
 # Fields of a task for which trainings have one value only: the default, or the learner's.
 FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "actions")
+NEAR = 8  # m, to goals on a track in the beginning
+WIDEN_SHARE = 0.4  # of a run, after which goals are as far as they get
 _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 
@@ -49,12 +51,20 @@ class TrainOptions(Options):
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
     first_distance: Annotated[
         int | None,
-        Ge(1),
-        Doc("Cells, on a track metres, that goals are away at most in the beginning; all distances if not given."),
+        Ge(0),
+        Doc(
+            "Cells, on a track metres, that goals are away at most in the beginning; 0 for all distances at once. If "
+            f"not given, {NEAR} on a track, else 0."
+        ),
     ] = None
     widen_steps: Annotated[
-        int, Ge(1), Doc("Agent steps over which that grows to the farthest distance of the task.")
-    ] = 400_000
+        int | None,
+        Ge(1),
+        Doc(
+            "Agent steps over which that grows to the farthest distance of the task; if not given, "
+            f"{WIDEN_SHARE:g} of the run, by --minutes or --env-steps."
+        ),
+    ] = None
     overrides: Overrides = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
