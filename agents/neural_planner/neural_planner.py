@@ -63,6 +63,7 @@ class NeuralPlanner(ImitatingAgent):
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
     learns_several_tasks = True
+    senses_class: ClassVar[type[Senses]] = Senses
     read_sensors = staticmethod(range_sensor)
     map_reader = staticmethod(map_reader)
     config: NeuralPlannerConfig
@@ -83,7 +84,7 @@ class NeuralPlanner(ImitatingAgent):
     def for_interface(self, interface: Interface) -> Self:
         """Returns an agent with the same network, whose senses are those in the environments of an interface."""
         agent = copy.copy(self)
-        agent._senses, agent._cell_size = Senses(interface, self.name), interface.cell_size
+        agent._senses, agent._cell_size = self.senses_class(interface, self.name), interface.cell_size
         return agent
 
     def explore_from(self, seed: int) -> None:
