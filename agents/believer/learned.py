@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from importlib import resources
 from typing import Self
 
 import numpy as np
@@ -13,7 +12,7 @@ from mazebench.agent import Inputs, Interface
 
 from ..navigator.navigator import Navigator, Robot
 from ..robot.change_belief import ChangeBelief, reads_maps_of
-from ..robot.change_network import NAME, ChangeNetwork, load
+from ..robot.change_network import SHIPPED, ChangeNetwork, load
 from ..robot.senses import Memory
 
 
@@ -43,12 +42,12 @@ class LearnedBeliever(Navigator):
         Raises:
           InputError: if the checkpoint can't be read, or is another agent's.
         """
-        return cls(interface, load(checkpoint or cls.default_checkpoint()))
+        return cls(interface, load(checkpoint or SHIPPED))
 
     @classmethod
     def default_checkpoint(cls) -> pathlib.Path:
         """Returns the network that ships."""
-        return pathlib.Path(str(resources.files("mazebench_assets") / "checkpoints" / f"{NAME}.safetensors"))
+        return SHIPPED
 
     def begin(self, memory: Memory, seed: int) -> Robot:
         """Returns the robot of an episode, which has not asked yet."""

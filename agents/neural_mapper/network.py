@@ -48,9 +48,13 @@ class WallWriter(nn.Module):
         changes = self.layers(torch.cat([written.flatten(1) / MOST_EVIDENCE, rows], dim=1)).view_as(written)
         return (written + changes).clamp(-MOST_EVIDENCE, MOST_EVIDENCE)
 
-    def loss(self, written: torch.Tensor, is_wall: torch.Tensor) -> torch.Tensor:
-        """Returns the mean cross-entropy of log odds and walls, both `[B, S, S]`."""
-        return nn.functional.binary_cross_entropy_with_logits(written + _PRIOR, is_wall.float())
+    def loss(self, written: torch.Tensor, is_wall: torch.Tensor, is_seen: torch.Tensor) -> torch.Tensor:
+        """Returns the mean cross-entropy of log odds and truth; where nothing was seen, the log odds should be 0.
+
+        All are `[B, S, S]`, the last two bool: the walls, and the cells that a ray has reached so far.
+        """
+        wanted = torch.where(is_seen, is_wall.float(), UNKNOWN)
+        return nn.functional.binary_cross_entropy_with_logits(written + _PRIOR, wanted)
 
     @one_torch_thread()
     @torch.no_grad()

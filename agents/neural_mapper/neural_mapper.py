@@ -23,7 +23,9 @@ SHIPPED = pathlib.Path(str(resources.files("mazebench_assets") / "checkpoints" /
 
 
 class WrittenSenses(Senses):
-    """Takes the observed pose for the pose on the map, and writes scans into its map by a network."""
+    """Takes the observed pose for the pose on the map, and writes what scans tell by a network."""
+
+    num_turns = 1
 
     def __init__(self, interface: Interface, agent: str):
         """Raises `UnplayableError`, in the name of `agent`, without exact positions, a lidar and cells of 1 m."""
@@ -37,6 +39,7 @@ class WrittenSenses(Senses):
         self._writer = load(SHIPPED)
 
     def write(self, evidence: np.ndarray, body: MovingBody, ranges: np.ndarray, deviation: float) -> None:
+        """Writes what a scan tells, in place."""
         self._writer.write(evidence, body.x, body.y, body.yaw, ranges)
 
 
@@ -45,3 +48,4 @@ class NeuralMapper(NeuralPlanner):
 
     name: ClassVar[str] = "neural-mapper"
     senses_class: ClassVar[type[Senses]] = WrittenSenses
+    believes: ClassVar[bool] = True

@@ -5,6 +5,8 @@ python -m mazebench_agents.neural_mapper.scan_training --out scan-walls.safetens
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import torch
 
@@ -13,7 +15,7 @@ from mazebench.tasks.sensors.lidar import read
 from mazebench.world.ray_casting import TURTLEBOT3, Lidar
 
 from ..common.lessons import Lessons, main
-from .network import NAME, SIDE, WallWriter, rows_of
+from .network import NAME, NUM_RAYS, REACH, SIDE, WallWriter, rows_of
 
 _SIZE = 31  # cells a side
 _NUM_MAZES = 256  # that walks are in at a time
@@ -24,51 +26,67 @@ _STAYS = 0.5  # share of steps within a cell
 _TURN = 0.6  # rad, standard deviation of a turn
 _SEED = 77_000  # of mazes in no split
 _HALF = SIDE // 2
+_SIDES = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+_ALONG = np.arange(0, REACH + 0.2, 0.2)  # m, points of a ray
+_INTO = 0.05  # m behind the face of a wall
+
+
+class Walked(NamedTuple):
+    """Walks, each in a maze with walls around it, `H` cells a side; `T` scans each."""
+
+    cells: np.ndarray  # [T, B, 2] int, of the bodies, in the maze without these walls
+    rows: np.ndarray  # [T, B, R + 3] float32, see `rows_of`
+    seen: np.ndarray  # [T, B, H, H] bool, the cells that a ray has reached so far
+    walls: np.ndarray  # [B, H, H] bool
 
 
 class Walks:
-    """A stream of walks: poses, scans and walls around them."""
+    """A stream of random walks in fresh mazes, with the scans of the lidar of the tracks."""
 
     def __init__(self, seed: int, begin: int = 0):
         """Draws from a seed of two numbers."""
         self._rng, self._num_drawn = np.random.default_rng([_SEED, seed, begin]), 0
 
-    def draw(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Returns mazes `[count]` int, cells `[T, count, 2]` int, inputs `[T, count, R + 3]` and all walls."""
+    def draw(self, count: int) -> Walked:
+        """Returns the next walks."""
         rng = self._rng
         if self._num_drawn % _SAME_MAZES == 0:
-            kinds = rng.choice(KNOWN, _NUM_MAZES)
-            self._mazes = tuple(generate(kind, _SIZE, rng) for kind in kinds)
+            self._mazes = tuple(generate(kind, _SIZE, rng) for kind in rng.choice(KNOWN, _NUM_MAZES))
             self._lidar = Lidar(self._mazes, TURTLEBOT3.max_range)
-            self._walls = np.pad(
-                np.stack([maze.walls for maze in self._mazes]),
-                ((0, 0), (_HALF, _HALF), (_HALF, _HALF)),
-                constant_values=True,
-            )
+            around = ((0, 0), (_HALF, _HALF), (_HALF, _HALF))
+            self._walls = np.pad(np.stack([maze.walls for maze in self._mazes]), around, constant_values=True)
         self._num_drawn += 1
-        maze = rng.integers(_NUM_MAZES, size=count)
+        maze, all_walks = rng.integers(_NUM_MAZES, size=count), np.arange(count)
+        walls = self._walls[maze]
         free = [np.argwhere(~self._mazes[number].walls) for number in maze]
         cell = np.array([cells[rng.integers(len(cells))] for cells in free])
-        yaw = rng.uniform(-np.pi, np.pi, count)
-        cells, inputs = [], []
-        sides = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+        yaw, seen = rng.uniform(-np.pi, np.pi, count), np.zeros(walls.shape, dtype=bool)
+        steps: list[tuple[np.ndarray, ...]] = []
         for _ in range(_LENGTH):
-            tried = cell + sides[rng.integers(4, size=count)]
-            is_open = ~self._walls[maze, tried[:, 0] + _HALF, tried[:, 1] + _HALF] & (rng.random(count) > _STAYS)
-            cell = np.where(is_open[:, None], tried, cell)
-            yaw = yaw + rng.normal(0, _TURN, count)
+            # It stays in its cell, or goes to one beside it.
+            tried = cell + _SIDES[rng.integers(4, size=count)]
+            is_open = ~walls[all_walks, tried[:, 0] + _HALF, tried[:, 1] + _HALF] & (rng.random(count) > _STAYS)
+            cell, yaw = np.where(is_open[:, None], tried, cell), yaw + rng.normal(0, _TURN, count)
             off = rng.uniform(-_OFF, _OFF, (count, 2))
             pose = np.column_stack([cell[:, 1] + 0.5 + off[:, 0], _SIZE - 0.5 - cell[:, 0] + off[:, 1], yaw])
-            ranges = read(self._lidar.ranges(maze, pose), TURTLEBOT3, [rng] * count)
-            cells.append(cell)
-            inputs.append(rows_of(pose, ranges.astype(np.float64)))
-        return maze, np.stack(cells), np.stack(inputs), self._walls
+
+            # Points along the rays, as far as into the cells of walls.
+            true = self._lidar.ranges(maze, pose)
+            angles = yaw[:, None] + np.arange(NUM_RAYS) * (2 * np.pi / NUM_RAYS)
+            length = np.minimum(_ALONG, np.where(true < REACH, true + _INTO, REACH)[..., None])
+            column = np.floor(pose[:, 0, None, None] + np.cos(angles)[..., None] * length).astype(int)
+            level = np.floor(pose[:, 1, None, None] + np.sin(angles)[..., None] * length).astype(int)
+            seen[all_walks[:, None, None], _SIZE - 1 - level + _HALF, column + _HALF] = True
+            ranges = read(true, TURTLEBOT3, [rng] * count).astype(np.float64)
+            steps.append((cell, rows_of(pose, ranges), seen.copy()))
+        cells, rows, all_seen = (np.stack(parts) for parts in zip(*steps, strict=True))
+        return Walked(cells, rows, all_seen, walls)
 
 
 class ScanLessons(Lessons):
     """Walks, in which the network reads what it wrote."""
 
-    name, num_updates, learning_rate, batch = NAME, 24_000, 1e-3, 128
+    name, num_updates, learning_rate, batch = NAME, 16_000, 1e-3, 128
 
     def __init__(self, seed: int, begin: int = 0):
         self._walks = Walks(seed, begin)
@@ -77,14 +95,13 @@ class ScanLessons(Lessons):
         return WallWriter()
 
     def next_loss(self, network: WallWriter) -> torch.Tensor:
-        maze, cells, inputs, walls = self._walks.draw(self.batch)
-        is_wall, window = torch.from_numpy(walls)[torch.from_numpy(maze)], torch.arange(SIDE)
-        written, number = torch.zeros(is_wall.shape), torch.arange(self.batch)[:, None, None]
-        loss = torch.zeros(())
-        for cell, rows in zip(torch.from_numpy(cells), torch.from_numpy(inputs), strict=True):
+        *steps, walls = (torch.from_numpy(part) for part in self._walks.draw(self.batch))
+        window, number = torch.arange(SIDE), torch.arange(self.batch)[:, None, None]
+        written, loss = torch.zeros(walls.shape), torch.zeros(())
+        for cell, rows, seen in zip(*steps, strict=True):
             around = number, cell[:, 0, None, None] + window[:, None], cell[:, 1, None, None] + window
             patch = network(written[around], rows)
-            loss = loss + network.loss(patch, is_wall[around]) / _LENGTH
+            loss = loss + network.loss(patch, walls[around], seen[around]) / _LENGTH
             written = written.index_put(around, patch)
         return loss
 

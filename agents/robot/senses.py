@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
+from typing import ClassVar
 
 import numpy as np
 from scipy import ndimage
@@ -112,6 +113,8 @@ def range_sensor(sensors: tuple[str, ...]) -> tuple[str, ...]:
 class Senses:
     """The senses of a robot in the environments of one interface, with their lidar or camera if they have one."""
 
+    num_turns: ClassVar[int] = 8  # ways in which a map may lie that does not mark the start
+
     def __init__(self, interface: Interface, agent: str):
         """Raises `UnplayableError`, in the name of `agent`, if maps have less than a pixel per cell.
 
@@ -192,7 +195,7 @@ class Senses:
         reading, odometry = read_map(context, self._size, self._guess), _pose(observed)
         if off_centre < _ROUNDING:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
-            num_turns = 1 if context[START].any() else 8
+            num_turns = 1 if context[START].any() else self.num_turns
             belief = MapBelief(reading.walls, reading.goal, num_turns, None, self._size)
             if ranges is None or self._odometry_noise == 0:
                 return Memory(belief, observed, _EXACT, self._cell_size)
