@@ -1,7 +1,9 @@
-"""Agents that see less: the navigator by the lidar's rays that lie in a camera's view, the map policy without pictures.
+"""Agents that see or remember less: controls of what a sensor, or a memory, is worth to them.
 
 mazebench eval --agent benchmarks.views:NarrowNavigator --track rebuilt --level 2 --split dev --actions velocity
 mazebench eval --agent benchmarks.views:GreyMapPolicy --track building --sensors egocentric --split dev
+mazebench eval --agent benchmarks.views:BlindMapper --track rebuilt --level 2 --split dev
+mazebench eval --agent benchmarks.views:ForgetfulMapper --track rebuilt --level 2 --split dev
 """
 
 from __future__ import annotations
@@ -11,6 +13,10 @@ from typing import Any
 import numpy as np
 from mazebench_agents.map_policy.map_policy import MapPolicy
 from mazebench_agents.navigator.navigator import Navigator
+from mazebench_agents.neural_mapper.network import REACH
+from mazebench_agents.neural_mapper.neural_mapper import NeuralMapper, WrittenSenses
+from mazebench_agents.neural_planner.neural_planner import NeuralPlanner
+from mazebench_agents.robot.moving_body import MovingBody
 from mazebench_agents.robot.senses import Senses
 
 from mazebench.agent import Inputs, Interface
@@ -46,3 +52,36 @@ class GreyMapPolicy(MapPolicy):
         """Returns actions `[B]`."""
         grey = np.full_like(inputs.observation["egocentric"], _GREY)
         return super().act(inputs._replace(observation=inputs.observation | {"egocentric": grey}), state, explore)
+
+
+class BelievingPlanner(NeuralPlanner):
+    """The neural planner, told by a network where its map is probably wrong."""
+
+    believes = True
+
+
+class _BlindSenses(WrittenSenses):
+    """Senses whose scans never meet a wall."""
+
+    def write(self, evidence: np.ndarray, body: MovingBody, ranges: np.ndarray, deviation: float) -> None:
+        super().write(evidence, body, np.full_like(ranges, REACH), deviation)
+
+
+class BlindMapper(NeuralMapper):
+    """The neural mapper with a lidar that sees nothing."""
+
+    senses_class = _BlindSenses
+
+
+class _ForgetfulSenses(WrittenSenses):
+    """Senses that know the last scan alone."""
+
+    def write(self, evidence: np.ndarray, body: MovingBody, ranges: np.ndarray, deviation: float) -> None:
+        evidence[:] = 0.0
+        super().write(evidence, body, ranges, deviation)
+
+
+class ForgetfulMapper(NeuralMapper):
+    """The neural mapper that forgets what it wrote before."""
+
+    senses_class = _ForgetfulSenses

@@ -10,9 +10,9 @@ import pytest
 import torch
 from mazebench_agents.common.symmetry import NUM_SYMMETRIES, turn_cells
 from mazebench_agents.navigator import Navigator
-from mazebench_agents.robot import bend_training, map_reading
-from mazebench_agents.robot.bend_network import PLACES, BendNetwork, load, on_picture, turn_bends
-from mazebench_agents.robot.bend_training import Drawings, Training, true_bends
+from mazebench_agents.robot import map_reading
+from mazebench_agents.robot.bend_network import PLACES, load, on_picture, turn_bends
+from mazebench_agents.robot.bend_training import Drawings, true_bends
 from mazebench_agents.robot.drawn_map import Guess, drawing_box, register
 from mazebench_agents.robot.map_reading import BENDS, map_reader, read_map
 
@@ -161,14 +161,3 @@ class TestResults:
         monkeypatch.setattr(map_reading, "BENDS", other)
         with pytest.raises(InputError, match="holds another run: its map_reader_sha256 is"):
             self.play(tmp_path / "run", resume=True)
-
-
-def test_training_lowers_the_loss_and_goes_on_where_it_was(monkeypatch):
-    monkeypatch.setattr(bend_training, "_FIRST", 64)
-    training = Training(num_updates=10, seed=0)
-    [(_, first)] = training.run()
-    again = Training(num_updates=30, seed=0, tensors=training.tensors())
-    [(num_updates, last)] = again.run()
-    assert num_updates == 30
-    assert last < first
-    assert isinstance(again.network, BendNetwork)

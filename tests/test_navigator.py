@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from acting import inputs_of
+from mazebench_agents.navigator.navigator import Robot
 from mazebench_agents.robot import planning
 from mazebench_agents.robot.driving import Drive
 from mazebench_agents.robot.map_matching import MapBelief
@@ -144,7 +145,7 @@ class TestReferences:
         for seen, expected in ((None, shown), ((2, 3), shown), ((1, 3), true)):
             if seen:
                 memory.evidence[seen] = 5.0
-            np.testing.assert_array_equal(agent.estimate(memory, inputs, 0)[0], expected)
+            np.testing.assert_array_equal(agent.estimate(Robot(memory), inputs, 0)[0], expected)
 
     def test_the_told_navigator_is_privileged(self):
         found = mazebench.evaluate("navigator-told", "rebuilt", level=3, split="dev", distances=(15,))

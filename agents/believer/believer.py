@@ -158,19 +158,8 @@ class Believer(Navigator):
 
     def _way(self, robot: BelievingRobot, placement: tuple[int, int, int]) -> _Way | None:
         """Returns the way to the leg's goal on the map as it lies; None if the map is vague, or shows no goal."""
-        belief, size = robot.memory.belief, len(robot.memory.searched)
-        orientation, row, column = placement
-        planes = belief.walls[orientation], belief.goals[orientation]
-        goal = np.unravel_index(planes[1].argmax(), planes[1].shape)
-        if (np.abs(planes[0] - 0.5) < _CRISP).any() or planes[1][goal] < 0.5:
+        walls, goals = robot.memory.belief.laid(placement)
+        goal = divmod(int(goals.argmax()), len(goals))
+        if (np.abs(walls - 0.5) < _CRISP).any() or goals[goal] < 0.5 or walls[goal] == 1:
             return None
-        shown = np.ones((size, size), dtype=bool)  # the map's cell at (row, column) lies at the grid's first one
-        rows, columns = (slice(max(0, -first), min(size, len(planes[0]) - first)) for first in (row, column))
-        shown[rows, columns] = planes[0][_shifted(rows, row), _shifted(columns, column)] > 0.5
-        end = int(goal[0]) - row, int(goal[1]) - column
-        inside = all(0 < each < size - 1 for each in end)
-        return _Way(shown, robot.memory, robot.leg_start, end, robot.seed) if inside else None
-
-
-def _shifted(cells: slice, by: int) -> slice:
-    return slice(cells.start + by, cells.stop + by)
+        return _Way(walls > 0.5, robot.memory, robot.leg_start, goal, robot.seed)

@@ -79,7 +79,7 @@ class Navigator(Agent):
                     robot.passages.update(memory)
 
                 # A path over walls and goal as they are estimated now.
-                walls, goal = self.estimate(memory, inputs, slot)
+                walls, goal = self.estimate(robot, inputs, slot)
                 closed = None if robot.passages is None else robot.passages.costs(memory)
                 path = self.find_path(robot, walls, goal, closed)
 
@@ -111,9 +111,9 @@ class Navigator(Agent):
         knows_pose = memory.tracker is None and memory.dead_reckoning is None
         return Passages(memory) if self.waits and knows_pose and not self._senses.feels and not self._turns else None
 
-    def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
+    def estimate(self, robot: Robot, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns what it plans on, `[L, L]` float twice: the probability of a wall, and weights of the goal."""
-        return memory.estimate()
+        return robot.memory.estimate()
 
     def report(self, state: list[Robot | None]) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""

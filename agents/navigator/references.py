@@ -13,7 +13,6 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from ..robot.cells import marked_cell
 from ..robot.occupancy import SURE
 from ..robot.planning import plan
-from ..robot.senses import Memory
 from .navigator import Navigator, Robot
 
 
@@ -26,10 +25,11 @@ class NavigatorTold(Navigator):
     needs_truth = True
     needs_shown = ("map", "goal")
 
-    def estimate(self, memory: Memory, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
+    def estimate(self, robot: Robot, inputs: Inputs, slot: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns the shown walls, or the true ones once it is blocked, and the goal."""
         assert inputs.truth is not None, "an evaluation gives the truth to a class that declares needs_truth"
-        context, true_walls = inputs.observation["context"][slot].astype(float), inputs.truth.walls[slot].astype(float)
+        memory, true_walls = robot.memory, inputs.truth.walls[slot].astype(float)
+        context = inputs.observation["context"][slot].astype(float)
         walls, goal = context[GLOBAL_MAP], context[GOAL]
         if len(memory.belief.placements) > 1 or walls.shape != true_walls.shape:
             raise UnplayableError(

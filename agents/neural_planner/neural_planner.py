@@ -22,6 +22,8 @@ from ..common.actor import acting
 from ..common.layers import in_batches
 from ..common.rollouts import RolloutLearner, Rows
 from ..imitation import ImitatingAgent, ImitationLearner
+from ..robot.change_belief import ChangeBelief, reads_maps_of
+from ..robot.change_network import ChangeNetwork, load
 from ..robot.map_reading import map_reader
 from ..robot.motion import Motion, moved_in_the_open
 from ..robot.rays import ranges_to
@@ -46,6 +48,17 @@ class Robot:
     plan: Plan = dataclasses.field(init=False)  # of [L, L] each
     age: int = 0  # steps of the leg
     actions: tuple[int, int] = (-1, -1)  # the last one, and the one before
+    changes: ChangeBelief | None = None  # of what its map has wrong, if it has any such belief
+
+    @property
+    def prior(self) -> np.ndarray:
+        """The probability of a wall by the map, `[L, L]` float."""
+        believed = None if self.changes is None else self.changes.prior
+        return self.memory.prior if believed is None else believed
+
+    def estimate(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns what `Memory.estimate` does, by its prior."""
+        return self.memory.estimate(None if self.changes is None else self.changes.prior)
 
 
 @dataclasses.dataclass
@@ -63,12 +76,15 @@ class NeuralPlanner(ImitatingAgent):
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
     learns_several_tasks = True
+    senses_class: ClassVar[type[Senses]] = Senses
+    believes: ClassVar[bool] = False  # whether a network tells it where its map is probably wrong
     read_sensors = staticmethod(range_sensor)
     map_reader = staticmethod(map_reader)
     config: NeuralPlannerConfig
     network: PlannerNetwork
     _senses: Senses
     _cell_size: float  # m
+    _changes: ChangeNetwork | None
 
     @classmethod
     def make_network(cls, config: NeuralPlannerConfig, context_size: int) -> PlannerNetwork:
@@ -83,7 +99,8 @@ class NeuralPlanner(ImitatingAgent):
     def for_interface(self, interface: Interface) -> Self:
         """Returns an agent with the same network, whose senses are those in the environments of an interface."""
         agent = copy.copy(self)
-        agent._senses, agent._cell_size = Senses(interface, self.name), interface.cell_size
+        agent._senses, agent._cell_size = self.senses_class(interface, self.name), interface.cell_size
+        agent._changes = load() if self.believes and reads_maps_of(interface) else None
         return agent
 
     def rate(self, parameter: str) -> float:
@@ -109,8 +126,11 @@ class NeuralPlanner(ImitatingAgent):
             memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
             if robot is None or robot.memory is not memory:  # an episode begins
                 robot = state.robots[slot] = Robot(memory, np.random.default_rng(int(inputs.seed[slot])))
+                robot.changes = None if self._changes is None else ChangeBelief(self._changes)
             if inputs.new_context[slot]:
                 robot.age = 0  # the next leg has another goal
+            if robot.changes is not None:
+                robot.changes.update(memory, bool(inputs.new_context[slot]))
             robots.append(robot)
         self._plan([robot for robot in robots if robot.age % self.config.plan_steps == 0])
 
@@ -165,8 +185,8 @@ class NeuralPlanner(ImitatingAgent):
         """Plans for robots, those whose grids have one size at once."""
         for robot in robots:
             memory = robot.memory
-            walls, goal = memory.estimate()
-            robot.grid = grid_bytes(memory.prior, walls, memory.evidence, goal)
+            walls, goal = robot.estimate()
+            robot.grid = grid_bytes(robot.prior, walls, memory.evidence, goal)
         for same in _of_one_size(robots):
             grids = torch.from_numpy(np.stack([robots[index].grid for index in same]))
             plan = in_batches(self.network.plan, _GRIDS_AT_ONCE, grids)
@@ -179,7 +199,7 @@ class NeuralPlanner(ImitatingAgent):
         pose = np.array([(body.x, body.y, body.yaw) for body in bodies]).reshape(-1, 3)
         velocity = np.array([(body.forward, body.left) for body in bodies]).reshape(-1, 2)
         ranges = [
-            ranges_to(robot.memory.estimate()[0] > _WALL, *where, NUM_RANGES, REACH)
+            ranges_to(robot.estimate()[0] > _WALL, *where, NUM_RANGES, REACH)
             for robot, where in zip(robots, pose.tolist(), strict=True)
         ]
         actions = np.array([robot.actions for robot in robots]).reshape(-1, 2)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import pathlib
+from importlib import resources
 
 import numpy as np
 import torch
@@ -16,6 +17,7 @@ from ..common.checkpoint import load_checkpoint, load_into
 from ..common.u_net import UNet
 
 NAME = "map-changes"
+SHIPPED = pathlib.Path(str(resources.files("mazebench_assets") / "checkpoints" / f"{NAME}.safetensors"))
 
 _CHANNELS = (16, 32, 48)  # of features at 1, 2 and 4 cells
 _MULTIPLE = 2 ** (len(_CHANNELS) - 1)  # of cells along an axis of the inputs
@@ -50,8 +52,12 @@ class ChangeNetwork(UNet):
         return torch.sigmoid(self.log_odds(*planes))[0].double().numpy()
 
 
-def load(path: pathlib.Path) -> ChangeNetwork:
-    """Returns the network of a file; raises `InputError` if that can't be read, or is none of such a network."""
+def load(path: pathlib.Path = SHIPPED) -> ChangeNetwork:
+    """Returns the network of a file, by default of the one that ships.
+
+    Raises:
+      InputError: if the file can't be read, or is none of such a network.
+    """
     network = ChangeNetwork()
     load_into(path, network, load_checkpoint(path, NAME)[0])
     return network

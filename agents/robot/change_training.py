@@ -5,11 +5,7 @@ python -m mazebench_agents.robot.change_training --out map-changes.safetensors
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-import pathlib
-import time
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,23 +19,16 @@ from mazebench.maps.search import distances
 from mazebench.tasks.perturbations.moved_doors import MovedDoors
 from mazebench.tasks.perturbations.perturbation import ShownMap
 
-from ..common.actor import one_torch_thread
-from ..common.checkpoint import save_checkpoint
-from ..common.descent import Descent, cosine
-from ..common.symmetry import NUM_SYMMETRIES, turn_planes
+from ..common.lessons import KeptLessons, main
+from ..common.symmetry import turn_planes
 from .change_network import NAME, ChangeNetwork
 
 _SIZE = 31  # cells a side
-_BATCH = 16
-_NEW = 8  # maps per update, in the place of the oldest ones
-_FIRST = 512  # maps before the first update
-_NUM_KEPT = 8192  # maps that batches are taken from
 _SAME_MAZE = 4  # maps of a maze, one for each of these changes
 _MOVED = (None, MovedDoors(45), MovedDoors(70), MovedDoors(85))
 _SIGHT = 3.5  # m
 _LONGEST = 300  # cells of a walk; the logs of their numbers are as likely as each other
 _UNSEEN = 0.1  # share of maps of which nothing was seen yet
-_REPORTED = 100  # updates
 _SEED = 76_000  # of mazes in no split
 
 
@@ -54,9 +43,9 @@ class Seen(NamedTuple):
 class Walks:
     """A stream of maps of mazes of some kinds, and of what a robot has seen that walks from place to place."""
 
-    def __init__(self, seed: int, kinds: tuple[str, ...] = KNOWN):
-        """Draws from a seed; each maze is a new one."""
-        self._rng, self._kinds = np.random.default_rng([_SEED, seed]), kinds
+    def __init__(self, seed: int, begin: int = 0, kinds: tuple[str, ...] = KNOWN):
+        """Draws from a seed of two numbers; each maze is a new one."""
+        self._rng, self._kinds = np.random.default_rng([_SEED, seed, begin]), kinds
         self._offsets, self._before = sight_lines(_SIGHT)
         self._num_drawn = 0
 
@@ -112,44 +101,24 @@ def _walk(
     return count
 
 
-def train(num_updates: int, seed: int) -> Iterator[tuple[int, float, ChangeNetwork]]:
-    """Yields updates, their mean loss and the moving average of the networks so far, every few hundred updates."""
-    torch.manual_seed(seed)
-    network = ChangeNetwork()
-    network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    descent = Descent(
-        network,
-        torch.optim.Adam(network.parameters(), 3e-3),
-        max_gradient_norm=1.0,
-        target_rate=0.005,
-        rate=lambda update: min(1.0, update / 100) * cosine((update - 1) / num_updates),
-    )
-    walks, rng, losses, num_drawn = Walks(seed), np.random.default_rng(seed), [], 0
-    kept = torch.empty((3, _NUM_KEPT, _SIZE, _SIZE), dtype=torch.bool)
-    for update in range(1, num_updates + 1):
-        for _ in range(_NEW if num_drawn else _FIRST):
-            kept[:, num_drawn % _NUM_KEPT] = torch.from_numpy(np.stack(walks.draw()))
-            num_drawn += 1
-        chosen = torch.from_numpy(rng.integers(min(num_drawn, _NUM_KEPT), size=_BATCH))
-        loss = network.loss(*turn_planes(kept[:, chosen], int(rng.integers(NUM_SYMMETRIES))))
-        descent.step(loss)
-        losses.append(loss.item())
-        if update % _REPORTED == 0 or update == num_updates:
-            yield update, float(np.mean(losses[-_REPORTED:])), descent.target
+class ChangeLessons(KeptLessons):
+    """Maps, their buildings and what was seen of these."""
 
+    name, num_updates, learning_rate, batch = NAME, 12_000, 3e-3, 16
 
-@one_torch_thread()
-def main() -> None:
-    """Trains, and writes the network now and then."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--updates", type=int, default=4_000, help=f"of {_BATCH} maps each")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=pathlib.Path, required=True, help="the file to write")
-    options = parser.parse_args()
-    for update, loss, network in train(options.updates, options.seed):
-        save_checkpoint(options.out, network.state_dict(), {"agent": NAME, "seed": options.seed, "updates": update})
-        print(f"{update:,} updates, {time.process_time():.0f} s of CPU, loss {loss:.5f}", flush=True)
+    def __init__(self, seed: int, begin: int = 0):
+        super().__init__(seed, begin)
+        self._walks = Walks(seed, begin)
+
+    def make_network(self) -> ChangeNetwork:
+        return ChangeNetwork()
+
+    def sample(self) -> tuple[np.ndarray, ...]:
+        return self._walks.draw()
+
+    def loss(self, network: ChangeNetwork, parts: list[torch.Tensor], symmetry: int) -> torch.Tensor:
+        return network.loss(*(turn_planes(part, symmetry) for part in parts))
 
 
 if __name__ == "__main__":
-    main()
+    main(ChangeLessons, __doc__)

@@ -100,6 +100,10 @@ class MapBelief:
         orientation, row, column = self.placements[best].tolist()
         return (orientation, row, column) if weights[best] >= least else None
 
+    def laid(self, placement: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """Returns `[L, L]` float twice: the probabilities of a wall and of the goal on the grid, by one placement."""
+        return _mixed(self.walls, self.goals, np.array([placement]), np.ones(1), len(self.weighed))
+
     def on_map(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
         """Returns a pose on the grid (cells, rad) as one on the map that is shown, by the likeliest hypothesis."""
         orientation, row, column = self.placements[self.log_weights.argmax()].tolist()

@@ -16,7 +16,7 @@ from .beams import UNKNOWN
 
 SURE = 3.0  # log odds of evidence, from which a cell counts as seen
 _BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
-PRIOR_AREA = 3.0  # m^2 of seen cells that weigh as much as the prior when the map's reliability is estimated
+_PRIOR_AREA = 3.0  # m^2 of seen cells that weigh as much as the prior when the map's reliability is estimated
 _LEAST = 1e-6  # count of cells of a kind, instead of none
 
 
@@ -26,23 +26,20 @@ def seen_walls(evidence: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def posterior(
-    prior: np.ndarray, evidence: np.ndarray, cell_size: float = 1.0, prior_area: float = PRIOR_AREA
-) -> np.ndarray:
+def posterior(prior: np.ndarray, evidence: np.ndarray, cell_size: float = 1.0) -> np.ndarray:
     """Returns `[L, L]` float: the probability of a wall, by evidence and a prior as reliable as it has proved to be.
 
     Where a cell was seen, evidence alone counts: what was seen is no longer tried, however right the map has been.
 
     Among cells of similar prior probability, the share of walls is estimated from those that were seen: the mean of a
-    beta distribution. Its prior counts weigh as much as `prior_area` of seen cells.
+    beta distribution. Its prior counts weigh as much as 3 m^2 of seen cells.
 
     Args:
       prior: `[L, L]` float; 1 for walls that are certain.
       evidence: `[L, L]` float, log odds.
       cell_size: m.
-      prior_area: m^2.
     """
-    prior_cells = prior_area / cell_size**2
+    prior_cells = _PRIOR_AREA / cell_size**2
     bin_of = np.searchsorted(_BINS, prior.ravel(), side="right").reshape(prior.shape)
     num_seen, num_walls = np.zeros(len(_BINS) + 1), np.zeros(len(_BINS) + 1)
     for row in range(len(prior)):

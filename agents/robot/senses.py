@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
+from typing import ClassVar
 
 import numpy as np
 from scipy import ndimage
@@ -25,7 +26,7 @@ from .dead_reckoning import DeadReckoning
 from .map_matching import MapBelief
 from .map_reading import guess_by, map_reader, read_map
 from .moving_body import LOOK_LEFT, LOOK_RIGHT, MovingBody, Point, observed_body
-from .occupancy import PRIOR_AREA, SURE, posterior, seen_walls
+from .occupancy import SURE, posterior, seen_walls
 from .tracking import Tracker, aligned
 
 _MARK_OFF = 1.0  # m, standard deviation of the goal from its marker, once it was not there
@@ -54,8 +55,6 @@ class Memory:
     commanded: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # the pose after the last action
     action: int = LOOK_LEFT  # the last one
     heading: float | None = None  # rad, with which the last action drives; None for the body's
-    prior_area: float = PRIOR_AREA  # m^2 of seen cells that weigh as much as the prior, see `posterior`
-    asked: np.ndarray | None = None  # [L, L] bool, the cells that were seen when the prior was last asked for
 
     def __post_init__(self) -> None:
         self.prior, self.goal = self.belief.mixture()
@@ -73,12 +72,17 @@ class Memory:
         x, y, yaw = self.belief.on_map(self.body.x, self.body.y, self.body.yaw)
         return x * self.cell_size, y * self.cell_size, yaw
 
-    def estimate(self) -> tuple[np.ndarray, np.ndarray]:
+    def estimate(self, prior: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Returns `[L, L]` float twice: the probability of a wall, and weights of the goal, perhaps all 0.
 
-        The map counts as much as it has proved right. The goal is in no cell that was searched, nor in a seen wall.
+        The map counts as much as it has proved right, but a given `prior`, `[L, L]` float, counts as it is. The goal is
+        in no cell that was searched, nor in a seen wall.
         """
-        walls = posterior(self.prior, self.evidence, self.cell_size, self.prior_area)
+        if prior is None:
+            walls = posterior(self.prior, self.evidence, self.cell_size)
+        else:
+            odds_free = np.where(np.abs(self.evidence) < SURE, (1 - prior) / prior, 1.0)
+            walls = np.where(prior < 1, 1 / (1 + odds_free * np.exp(-self.evidence)), 1.0)
         is_closed = (np.abs(self.evidence) >= SURE) & (walls > 0.5)
         is_possible = ~(self.searched | is_closed)
         goal = self.goal * is_possible
@@ -108,6 +112,8 @@ def range_sensor(sensors: tuple[str, ...]) -> tuple[str, ...]:
 
 class Senses:
     """The senses of a robot in the environments of one interface, with their lidar or camera if they have one."""
+
+    num_turns: ClassVar[int] = 8  # ways in which a map may lie that does not mark the start
 
     def __init__(self, interface: Interface, agent: str):
         """Raises `UnplayableError`, in the name of `agent`, if maps have less than a pixel per cell.
@@ -164,7 +170,7 @@ class Senses:
         # What the scan tells of walls.
         body, deviation = memory.body, memory.deviation / self._cell_size
         if ranges is not None:
-            add_scan(memory.evidence, body.x, body.y, body.yaw, ranges, self._beams, deviation)
+            self.write(memory.evidence, body, ranges, deviation)
 
         # The episode would have ended in the goal. Near a cell's border, the body may be in another one.
         off_x, off_y = (abs(coordinate % 1.0 - 0.5) for coordinate in (body.x, body.y))
@@ -178,6 +184,10 @@ class Senses:
             memory.prior, memory.goal = memory.belief.mixture()
         return memory
 
+    def write(self, evidence: np.ndarray, body: MovingBody, ranges: np.ndarray, deviation: float) -> None:
+        """Adds what a scan (cells) from a body tells to `evidence`, in place; `deviation` (cells) is the position's."""
+        add_scan(evidence, body.x, body.y, body.yaw, ranges, self._beams, deviation)
+
     def _begin(self, context: np.ndarray, observed: MovingBody, ranges: np.ndarray | None) -> Memory:
         """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
@@ -185,7 +195,7 @@ class Senses:
         reading, odometry = read_map(context, self._size, self._guess), _pose(observed)
         if off_centre < _ROUNDING:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
-            num_turns = 1 if context[START].any() else 8
+            num_turns = 1 if context[START].any() else self.num_turns
             belief = MapBelief(reading.walls, reading.goal, num_turns, None, self._size)
             if ranges is None or self._odometry_noise == 0:
                 return Memory(belief, observed, _EXACT, self._cell_size)
