@@ -49,7 +49,7 @@ PAGES = (
     "README.md",
     *(f"docs/{name}.md" for name in ("index", "results", "results_full", "tracks", "baselines", "experiments", "llm")),
     *(f"docs/{name}.md" for name in ("real", "datasheet", "your_map")),
-    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy")),
+    *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner", "map_policy", "believer", "neural_mapper")),
     *(f"docs/environments/{name}.md" for name in (*STANDING, "doors", "local", "hierarchical")),
     "docs/reproduce.md",  # the last one, since it lists the tables of the others
 )
@@ -73,6 +73,7 @@ DOOR_AGENTS = {  # of the track `doors`, by what the table calls them
 _TRACKS = [f"`{track}`" for track in STANDING]
 _KINDS = (*KNOWN, *NOVEL)
 _WITHOUT_MEMORY = "navigator-without-memory"
+_BELIEVERS = ("believer", "believer-learned")
 
 _TRAINED = {
     "mmn": "`mmn`",
@@ -125,6 +126,7 @@ _REGIMES = {
 _GLANCE = {
     "oracle": "`oracle`: knows the building",
     "navigator": "`navigator`: a classical robot",
+    "believer-learned": "`believer-learned`: the same, with a learned belief of what has changed",
     "neural-planner": "`neural-planner`: learned driving, hand-written localization",
     "navigator without map": "`navigator` without the map",
 }
@@ -132,6 +134,7 @@ _UNSOLVED = "**Unsolved**: the best agent without hand-written localization"
 _NOTHING_BY_HAND = (
     *("dagger:Student", "sb3_agent:FieldPPOAgent", "sb3_agent:FieldRecurrentPPOAgent", "sb3_agent:PPOAgent"),
     *("sb3_agent:RecurrentPPOAgent", "sb3_her_agent:LidarHerAgent", "mah", "dqn", "map-policy-camera"),
+    "neural-mapper",
 )
 # Learned agents, and what was trained by the same recipe with the map hidden.
 _WITHOUT_MAP = {
@@ -182,11 +185,14 @@ _REAL_GLANCE = {
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
     "navigator": "`navigator`, classical",
+    "believer": "`believer`: the navigator with a belief over doors, by the model of how they move",
+    "believer-learned": "`believer-learned`: the navigator with a learned belief of what has changed",
     "navigator without map": "`navigator` without the map",
     "navigator without map and goal": "`navigator` without map and goal",
     "navigator with the true pose": "`navigator` with the true pose",
     "neural-planner": "`neural-planner`, trained by the oracle's labels",
     "neural-planner from rewards": "`neural-planner`, trained with rewards",
+    "neural-mapper": "`neural-mapper`: the same with a learned map and belief, no localization, one run",
     "dagger:Student": "90-second imitation of the oracle, reads distances on the map",
     "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map, progress reward",
     "sb3_agent:FieldRecurrentPPOAgent": "the same with an LSTM, one run",
@@ -429,8 +435,10 @@ def tracks_ceilings(kept: Kept) -> str:
     rows = []
     for track, level, own in kept.on_tracks("navigator without map"):
         told = [kept.of(*played) for played in ceilings(track, level).values()]
-        rows.append([f"`{track}` {level}", *(_number(each[ON_TIME_125].mean()) for each in (own, *told))])
-    return format_table(["setting", "`navigator` without the map", *ceilings("building", 1)], rows)
+        believers = [kept.of(agent, f"{track}-{level}") for agent in _BELIEVERS]
+        rows.append([f"`{track}` {level}", *(_number(each[ON_TIME_125].mean()) for each in (own, *told, *believers))])
+    header = ["setting", "`navigator` without the map", *ceilings("building", 1), *(f"`{name}`" for name in _BELIEVERS)]
+    return format_table(header, rows)
 
 
 def tracks_headroom(kept: Kept) -> str:
@@ -438,6 +446,7 @@ def tracks_headroom(kept: Kept) -> str:
     rows = []
     for agent in (
         "navigator",
+        *_BELIEVERS,
         "neural-planner",
         "neural-planner from rewards",
         "dagger:Student",
@@ -607,6 +616,9 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-on-time-2": lambda kept: by_agent(_ROWS, ON_TIME_2, kept),
     "tracks-learned": lambda kept: tracks_learned("neural-planner", kept),
     "tracks-rewarded": lambda kept: tracks_learned("neural-planner from rewards", kept),
+    "tracks-believer": lambda kept: tracks_learned("believer", kept),
+    "tracks-believer-learned": lambda kept: tracks_learned("believer-learned", kept),
+    "tracks-mapper": lambda kept: tracks_learned("neural-mapper", kept),
     "tracks-ppo": lambda kept: tracks_learned("sb3_agent:FieldPPOAgent", kept),
     "tracks-learned-worth": tracks_learned_worth,
     "tracks-ceilings": tracks_ceilings,
