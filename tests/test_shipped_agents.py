@@ -8,7 +8,7 @@ from mazebench_agents.common.checkpoint import load_checkpoint
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 
-SHIPPED = ("mmn", "mmn-paths", "mah", "mah-paper", "dqn", "neural-planner")
+SHIPPED = ("mmn", "mmn-paths", "mah", "mah-paper", "dqn", "neural-planner", "neural-mapper")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
