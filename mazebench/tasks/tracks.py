@@ -85,36 +85,43 @@ TRACKS = {
     BUILDING: Track(
         "The map is right, but may be turned or mirrored.",
         (
-            Level("the map as drawn"),
+            Level("the map lies as the building does"),
             Level(
-                "turned by unknown quarter turns; planes 1 and 3 of the context are zero",
+                "the map is turned by an unknown number of quarter turns; the start is unknown: planes 1 and 3 of the "
+                "context are zero",
                 (TurnedMap(turns=True), HiddenStart()),
             ),
-            Level("and mirrored with probability .5", (TurnedMap(turns=True, mirrors=True), HiddenStart())),
+            Level(
+                "as at level 2, and the map is mirrored with probability .5",
+                (TurnedMap(turns=True, mirrors=True), HiddenStart()),
+            ),
         ),
     ),
     REBUILT: Track(
         "Doors have moved since the map was drawn.",
         (
             Level("doors have moved: .45 of the shortest paths on the map are blocked", (MovedDoors(percent=45),)),
-            Level("doors have moved: .7 of the paths are blocked", (MovedDoors(percent=70),)),
-            Level("doors have moved: .85 of the paths are blocked", (MovedDoors(percent=85),)),
+            Level("doors have moved: .7 of the shortest paths on the map are blocked", (MovedDoors(percent=70),)),
+            Level("doors have moved: .85 of the shortest paths on the map are blocked", (MovedDoors(percent=85),)),
         ),
     ),
     ADRIFT: Track(
         "Doors have moved since the map was drawn, and the robot only has odometry: its place on the map is unknown.",
         (
             Level(
-                "doors have moved: .7 of the paths are blocked; the start is marked, the heading is unknown",
+                "doors have moved: .7 of the shortest paths on the map are blocked; the start is marked, the heading "
+                "is unknown",
                 (MovedDoors(percent=70), MotionNoise(0.01), LostPose()),
             ),
             Level(
-                "the same doors; the start is unknown, too: planes 1 and 3 of the context are zero",
+                "the same doors have moved as at level 1; start and heading are unknown: planes 1 and 3 of the "
+                "context are zero",
                 (MovedDoors(percent=70), MotionNoise(0.05), LostPose(), HiddenStart()),
             ),
             Level(
-                "doors have moved: .85 of the paths are blocked; the odometry drifts: its scale is off by up to 10 %, "
-                "its heading walks by 2 degrees per root second",
+                "doors have moved: .85 of the shortest paths on the map are blocked; start and heading are unknown; "
+                "the odometry drifts: its scale is off by up to 10 %, and its heading walks at random, by 2 degrees "
+                "per root second",
                 (MovedDoors(percent=85), MotionNoise(0.2), LostPose(drifts=True), HiddenStart()),
             ),
         ),
@@ -123,16 +130,18 @@ TRACKS = {
         "The map is drawn by hand, doors have moved since, and the pose is odometry.",
         (
             Level(
-                "bent by up to 0.5 m, and doors have moved: .45 of the paths are blocked; the start is marked",
+                "the map is bent by up to 0.5 m; doors have moved: .45 of the shortest paths on it are blocked; the "
+                "start is marked, the heading is unknown",
                 (MovedDoors(percent=45), HandDrawnMap(bend=0.5), MotionNoise(0.01), LostPose()),
             ),
             Level(
-                "bent by up to 1 m, .7 of the paths are blocked; the start is unknown, too",
+                "the map is bent by up to 1 m; .7 of the shortest paths on it are blocked; start and heading are "
+                "unknown",
                 (MovedDoors(percent=70), HandDrawnMap(bend=1.0), MotionNoise(0.05), LostPose(), HiddenStart()),
             ),
             Level(
-                "bent by up to 1.5 m, .7 of the paths are blocked; mirrored with probability .5, and the odometry "
-                "drifts",
+                "the map is bent by up to 1.5 m, and mirrored with probability .5; .7 of the shortest paths on it are "
+                "blocked; start and heading are unknown; the odometry drifts as on adrift 3",
                 (
                     MovedDoors(percent=70),
                     HandDrawnMap(bend=1.5),
@@ -148,12 +157,15 @@ TRACKS = {
         "The map is right, and doors close and open while one drives.",
         (
             Level(
-                "doors close and stay closed: one on the shortest way, and up to two others",
+                "a door on the shortest path, and up to two others, close and stay closed",
                 (MovingDoors(opens=False),),
             ),
-            Level("they open again, and then go on closing and opening", (MovingDoors(opens=True),)),
             Level(
-                "all doors of the building, up to 32, close and open, each in a period of its own",
+                "a door on the shortest path, and up to two others, close, open again, and repeat this",
+                (MovingDoors(opens=True),),
+            ),
+            Level(
+                "all doors that are open at first, up to 26, close and open, each in a period of its own",
                 (MovingDoors(opens=True, all_doors=True),),
             ),
         ),
