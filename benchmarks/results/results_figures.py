@@ -134,7 +134,7 @@ def first_training(kept: Kept) -> Figure:
     ):
         points = by_steps[name].agg(value="mean", low95="min", high95="max").rename_axis("x").reset_index()
         points = points.assign(column="neural-planner")
-        panels.append(Panel(title, "thousand agent steps", points, {x: f"{x}" for x in range(0, 61, 20)}, True))
+        panels.append(Panel(title, "thousand agent steps", points, {x: f"{x}" for x in range(0, 121, 40)}, True))
     return _figure("The first training", panels, "share")
 
 
