@@ -346,7 +346,7 @@ class TestTracks:
         options = {"sensors": agent_class.needs_sensors} | options if "size" in options else options
         kinds = agent_class.plays_actions
         spec = Task.of(**options, actions=None if "six" in kinds else kinds[0])
-        needs_pose = name == "costmap-dwa" and "size" not in options
+        needs_pose = name in ("costmap-dwa", "neural-mapper") and "size" not in options
         if name.startswith("llm") or name in ("map-policy", "navigator-told") or needs_pose:
             with pytest.raises(
                 UnplayableError,

@@ -56,7 +56,7 @@ def test_an_evaluation_has_the_same_bytes(command, cut, tmp_path):
     for summary in summaries:
         del summary["provenance"]["command"]
     assert summaries[0] == summaries[1]
-    assert run(command, "merge", "cut") == shown  # a second time it changes nothing
+    assert run(command, "merge", "cut") == shown.partition("\n")[2]  # a second time it changes nothing
     shards = [summary_of(cut / "shards" / number)["episodes"] for number in "123"]
     assert shards == [14, 14, 12]  # two in each of 20 mazes
     assert run(command, "report", "cut", "--out", "report").startswith("1 result of planner")

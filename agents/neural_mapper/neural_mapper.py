@@ -47,5 +47,6 @@ class NeuralMapper(NeuralPlanner):
     """Plans on costs and drives by a policy, both learned, on a map that a network writes from scans."""
 
     name: ClassVar[str] = "neural-mapper"
+    needs_sensors: ClassVar[tuple[str, ...]] = ("lidar",)
     senses_class: ClassVar[type[Senses]] = WrittenSenses
     believes: ClassVar[bool] = True

@@ -185,8 +185,8 @@ class TaskOptions(AllSensorOptions, ReadOptions):
         int,
         Ge(1),
         Doc(
-            "Goals of an episode, one after the other without a reset: in the local task with random pairs, and at most "
-            f"{MOST_GOALS} on building, rebuilt and doors. Rewards and success are those of the last one."
+            "Goals of an episode, one after the other without a reset: in the local task with random pairs, and at "
+            f"most {MOST_GOALS} on building, rebuilt and doors. Rewards and success are those of the last one."
         ),
     ] = 1
     reward: Annotated[
