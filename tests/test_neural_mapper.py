@@ -76,7 +76,7 @@ class TestDriving:
         [({"task": "adrift"}, "noise 0.01"), ({"task": "rebuilt", "sensors": "egocentric"}, "found egocentric")],
     )
     def test_it_refuses_noisy_positions_and_other_sensors(self, options, found):
-        with pytest.raises(InputError, match="agent 'neural-mapper': expected the sensor '?lidar") as error:
+        with pytest.raises(InputError, match=r"agent 'neural-mapper': expected the sensor '?lidar") as error:
             evaluate("neural-mapper", split="dev", **options)
         assert found in str(error.value)
 

@@ -77,6 +77,12 @@ def test_places_within_a_metre_are_one_and_the_worst_comes_first():
     assert (far.trips, far.cell, far.metres) == ((2,), (16, 10), 30.0)
 
 
+def test_places_of_two_changes_that_are_two_metres_apart_are_two():
+    shown, built = two_rooms(3, 6, 19), two_rooms(19)
+    trips = [((3, 9), (3, 11)), ((6, 9), (6, 11))]
+    assert [spot.cell for spot in spots_of(shown, built, trips, [10.0, 14.0])] == [(6, 10), (3, 10)]
+
+
 def test_a_wide_passage_is_one_place():
     doors = range(8, 14)
     trips = [((7, 9), (7, 11)), ((14, 9), (14, 11))]  # through its upper and through its lower side

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.ndimage
 import scipy.spatial
+from scipy.sparse.csgraph import connected_components
 
 from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.maps.older_map import OlderMap
@@ -80,27 +81,25 @@ def find_spots(
 
 
 def _joined(older: OlderMap, places: dict[int, _Place], lost: np.ndarray) -> list[Spot]:
-    """Returns the spots of the trips of one maze: places that are near each other, or in one small change, are one."""
-    maze, marked = older.maze, np.zeros(older.walls.shape, dtype=bool)
+    """Returns the spots of the trips of one maze: places of a kind that are near, or in one small change, are one."""
+    maze, trips = older.maze, list(places)
     changes, _ = scipy.ndimage.label(older.walls != maze.walls, np.ones((3, 3)))
     boxes = scipy.ndimage.find_objects(changes)
-    for place in places.values():
-        marked[place.cell] = True
-        if change := changes[place.cell]:
-            rows, columns = boxes[change - 1]
-            if max(rows.stop - rows.start, columns.stop - columns.start) * maze.cell_size <= _SMALL:
-                marked[rows, columns] |= changes[rows, columns] == change
-    reach = max(1, round(_NEAR / 2 / maze.cell_size))
-    areas, num_areas = scipy.ndimage.label(scipy.ndimage.binary_dilation(marked, np.ones((3, 3)), reach))
+    sides = [max(rows.stop - rows.start, columns.stop - columns.start) for rows, columns in boxes]
+    is_small = np.array([False, *(side * maze.cell_size <= _SMALL for side in sides)])
+    cells = np.array([places[trip].cell for trip in trips])
+    kinds, change = np.array([places[trip].kind for trip in trips]), changes[tuple(cells.T)]
+    is_near = (scipy.spatial.distance.cdist(cells, cells) - 1) * maze.cell_size <= _NEAR  # between their sides
+    is_one = is_near | ((change[:, None] == change) & is_small[change])
+    num_spots, spot_of = connected_components(is_one & (kinds[:, None] == kinds))
     spots = []
-    for area in range(1, num_areas + 1):
-        own = sorted((each for each in places if areas[places[each].cell] == area), key=lambda each: -lost[each])
-        row, column = np.mean([places[each].cell for each in own], axis=0).tolist()
+    for spot in range(num_spots):
+        chosen = np.flatnonzero(spot_of == spot)
+        own = sorted((trips[index] for index in chosen), key=lambda trip: -lost[trip])
+        row, column = cells[chosen].mean(axis=0).tolist()
         x, y = points_from(older.origin, *maze.point(np.array([row, column])).tolist())
-        kinds = [places[each].kind for each in own]
-        kind = max((CLOSED, OPENED, DETOUR), key=kinds.count)
         metres = float(lost[own].sum())
-        spots.append(Spot(maze.name, (float(x), float(y)), (row, column), kind, tuple(own), metres))
+        spots.append(Spot(maze.name, (float(x), float(y)), (row, column), places[own[0]].kind, tuple(own), metres))
     return spots
 
 
