@@ -165,7 +165,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))
             if archive.startswith(REAL):
-                agent, setting = summary.agent + archive.removeprefix(REAL), group_of(setting)
+                agent, setting = summary.agent + "-camera" * archive.endswith("-camera"), group_of(setting)
             if archive.startswith(REAL) or archive == TURTLEBOT3:
                 lines["episode"] = lines.maze + lines.episode.astype(str)
             rates = lines.groupby("maze")[ON_TIME_125].mean()

@@ -160,6 +160,7 @@ _EXPECTED_LOCAL = {
 _IN_REAL_BUILDINGS = {
     "oracle": "`oracle`, privileged",
     "navigator": "`navigator`, classical",
+    "believer": "`believer`: the navigator with a belief over passages",
     "navigator-camera": "`navigator` by camera",
     "neural-planner": "`neural-planner`, learned",
     "sb3_agent:FieldPPOAgent": "PPO, reads distances on the map, one run",
