@@ -22,7 +22,7 @@ _REPORTED = 200  # updates
 
 
 class Lessons(abc.ABC):
-    """What a network learns from."""
+    """The samples that a network learns from."""
 
     name: ClassVar[str]  # of the network
     num_updates: ClassVar[int]  # if not given

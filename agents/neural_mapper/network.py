@@ -13,12 +13,13 @@ import numpy as np
 import torch
 from torch import nn
 
+from mazebench.world.ray_casting import NUM_RAYS
+
 from ..common.actor import one_torch_thread
 from ..common.checkpoint import load_checkpoint, load_into
 from ..robot.beams import MOST_EVIDENCE, UNKNOWN
 
 NAME = "scan-walls"
-NUM_RAYS = 32
 REACH = 3.5  # cells
 SIDE = 9  # cells of the patch
 

@@ -12,10 +12,10 @@ import torch
 
 from mazebench.maps.kinds import KNOWN, generate
 from mazebench.tasks.sensors.lidar import read
-from mazebench.world.ray_casting import TURTLEBOT3, Lidar
+from mazebench.world.ray_casting import NUM_RAYS, TURTLEBOT3, Lidar
 
 from ..common.lessons import Lessons, main
-from .network import NAME, NUM_RAYS, REACH, SIDE, WallWriter, rows_of
+from .network import NAME, REACH, SIDE, WallWriter, rows_of
 
 _SIZE = 31  # cells a side
 _NUM_MAZES = 256  # that walks are in at a time

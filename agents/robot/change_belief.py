@@ -1,4 +1,4 @@
-"""What a robot believes of where its map is wrong, as a network tells it."""
+"""The belief of a robot about where its map is wrong, as a network tells it."""
 
 from __future__ import annotations
 
